@@ -1,0 +1,182 @@
+"""Every setting, its default and its meaning; YAML files hold only differences.
+
+Sub-configs that are None are switched off, and the switch is decided when the step is
+traced. `load_config` is in `settings.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import field
+
+
+class ConfigError(ValueError):
+    """A setting is unknown, of the wrong type, or impossible; the text names its key."""
+
+
+def _require(ok: bool, key: str, expected: str, got: object) -> None:
+    if not ok:
+        raise ConfigError(f"{key}: expected {expected}, got {got!r}")
+
+
+@dataclasses.dataclass(frozen=True)
+class PhysicsConfig:
+    """The simulator: engine, rate and servo."""
+
+    engine: str = "auto"  # auto | native | mjx | mjx-warp; auto: native on a CPU, mjx elsewhere
+    character: str = "humanoid49"  # assets/NAME.xml, or a path to an MJCF file
+    control_hz: int = 30  # policy rate
+    substeps: int = 4  # physics steps in one control period
+    solver: str = "newton"  # newton | cg | pgs (pgs: native only)
+    iterations: int = 5  # solver iterations at most
+    gain_scale: float = 1.0  # times the stiffness and damping of the MJCF file
+    torque_scale: float = 1.0  # times the torque limits of the MJCF file
+    armature: float = 0.05  # kg m^2, added to every hinge
+    threads: int = 0  # native: worker threads; 0: every CPU this process may use
+
+    def __post_init__(self) -> None:
+        engines = ("auto", "native", "mjx", "mjx-warp")
+        _require(self.engine in engines, "physics.engine", f"one of {engines}", self.engine)
+        solvers = ("newton", "cg", "pgs")
+        _require(self.solver in solvers, "physics.solver", f"one of {solvers}", self.solver)
+        mjx_pgs = self.engine.startswith("mjx") and self.solver == "pgs"
+        _require(not mjx_pgs, "physics.solver", "newton or cg, since MJX has no PGS", self.solver)
+        for name in ("control_hz", "substeps", "iterations", "gain_scale", "torque_scale"):
+            _require(getattr(self, name) > 0, f"physics.{name}", "more than 0", getattr(self, name))
+        _require(self.armature >= 0, "physics.armature", "at least 0", self.armature)
+        _require(self.threads >= 0, "physics.threads", "at least 0", self.threads)
+
+
+@dataclasses.dataclass(frozen=True)
+class MotionConfig:
+    """Which motions give the start poses, the curves and the pose prior's data."""
+
+    source: tuple[str, ...] = ("authored",)  # `authored`, `deepmimic`, folders or files
+    curves: tuple[str, ...] = ()  # names of the get-ups to train on; empty: all that are found
+    mirror: bool = True  # double the pose data by mirroring
+    augment: int = 4  # noisy copies of each authored pose for the pose prior
+    augment_noise_rad: float = 0.05  # standard deviation of that joint noise
+
+
+@dataclasses.dataclass(frozen=True)
+class PriorConfig:
+    """The conditional pose VAE."""
+
+    conditional: bool = True  # False: the standard pose VAE, for the ablation
+    latent_size: int = 16
+    hidden_sizes: tuple[int, ...] = (256, 256)
+    beta: float = 1e-6  # weight of the KL term
+    learning_rate: float = 1e-4
+    epochs: int = 100
+    batch_size: int = 128
+    min_updates: int = 20_000  # small pose sets get more epochs, until this many updates
+    holdout: float = 0.1  # share of the poses kept for the report
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _require(0 < self.holdout < 1, "prior.holdout", "between 0 and 1", self.holdout)
+        for name in ("latent_size", "learning_rate", "epochs", "batch_size"):
+            _require(getattr(self, name) > 0, f"prior.{name}", "more than 0", getattr(self, name))
+
+
+@dataclasses.dataclass(frozen=True)
+class TaskConfig:
+    """The get-up task: episodes, starts, early ends and the action."""
+
+    stand_time_s: float = 3.0  # standing phase after the curve's end
+    lookahead_s: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3)  # when the curve targets are seen
+    filter: float = 0.2  # share of the new action in the filtered one
+    offset_scale: float = 1.0  # rad, PD offset of a filtered action of 1
+    offset_limit_rad: float = 10.0  # c of the naturalness reward (equation 3)
+    target_margin_rad: float = 0.5  # how far past a joint limit a PD target may lie
+    terminate_reward: float = 0.1  # early end below this task reward ...
+    terminate_after_s: float = 0.3  # ... or with the head on the floor, for this long
+    head_clearance_m: float = 0.02  # the head is on the floor below this gap
+    stand_start: float = 0.3  # share of episodes that start standing
+    clip_start: float = 0.0  # share that starts along the reference clip
+    curve_match_rad: float = 0.52  # largest gap between a curve's and a pose's torso angles
+    start_noise_rad: float = 0.0  # joint noise of the start poses
+    pool_size: int = 2048  # start states made once
+    settle_s: float = 0.5  # lying starts rest this long before the pool keeps them
+
+    def __post_init__(self) -> None:
+        share = self.stand_start + self.clip_start
+        _require(0 <= share <= 1, "task.stand_start + task.clip_start", "between 0 and 1", share)
+        _require(0 < self.filter <= 1, "task.filter", "more than 0 and at most 1", self.filter)
+        _require(self.pool_size > 0, "task.pool_size", "more than 0", self.pool_size)
+
+
+@dataclasses.dataclass(frozen=True)
+class NetworkConfig:
+    """Actor and critic: separate multilayer perceptrons."""
+
+    hidden_sizes: tuple[int, ...] = (256, 256)
+    activation: str = "relu"  # relu | tanh | elu | silu | relu6
+
+    def __post_init__(self) -> None:
+        names = ("relu", "tanh", "elu", "silu", "relu6")
+        ok = self.activation in names
+        _require(ok, "network.activation", f"one of {names}", self.activation)
+
+
+@dataclasses.dataclass(frozen=True)
+class PPOConfig:
+    """PPO-Clip with GAE."""
+
+    num_envs: int = 512  # B
+    num_steps: int = 64  # T
+    epochs: int = 4
+    minibatch_size: int = 2048
+    discount: float = 0.99
+    gae_lambda: float = 0.95
+    clip: float = 0.2
+    value_coefficient: float = 0.5
+    entropy_coefficient: float = 0.0
+    max_gradient_norm: float = 0.5
+    learning_rate: tuple[float, ...] = (1e-4, 2e-5)  # first and last stage
+    action_std: tuple[float, ...] = (0.6, 0.3)  # first and last stage
+    stages: int = 5  # equal stages of the whole run, for both schedules
+    target_clip_fraction: float | None = None  # adapt the learning rate to it; None: off
+    normalize_observation: bool = True
+    popart: bool = False  # normalise the value targets of every objective
+
+    def __post_init__(self) -> None:
+        batch = self.num_envs * self.num_steps
+        ok = batch % self.minibatch_size == 0
+        expected = f"a divisor of num_envs * num_steps = {batch}"
+        _require(ok, "ppo.minibatch_size", expected, self.minibatch_size)
+        _require(0 <= self.discount < 1, "ppo.discount", "in [0, 1)", self.discount)
+        _require(0 <= self.gae_lambda <= 1, "ppo.gae_lambda", "in [0, 1]", self.gae_lambda)
+        for name in ("learning_rate", "action_std"):
+            ends = getattr(self, name)
+            _require(len(ends) == 2, f"ppo.{name}", "two values: first and last stage", ends)
+
+
+@dataclasses.dataclass(frozen=True)
+class TrainConfig:
+    """The run: length, where it writes, how often it logs and saves."""
+
+    total_steps: int = 100_000_000  # control steps (samples) of the whole run
+    log_every: int = 1  # iterations between log lines
+    save_every_s: float = 300.0  # wall time between checkpoints
+    keep: int = 2  # learner checkpoints kept
+    tensorboard: bool = False  # extra: tensorboard
+    init_from: str | None = None  # a checkpoint whose policy starts the run
+
+    def __post_init__(self) -> None:
+        _require(self.total_steps > 0, "train.total_steps", "more than 0", self.total_steps)
+        _require(self.keep >= 1, "train.keep", "at least 1", self.keep)
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """One run. `getup-train FILE section.key=value ...` overrides any of it."""
+
+    seed: int = 0
+    physics: PhysicsConfig = field(default_factory=PhysicsConfig)
+    motion: MotionConfig = field(default_factory=MotionConfig)
+    prior: PriorConfig = field(default_factory=PriorConfig)
+    task: TaskConfig = field(default_factory=TaskConfig)
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+    train: TrainConfig = field(default_factory=TrainConfig)

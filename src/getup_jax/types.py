@@ -1,0 +1,89 @@
+"""What crosses between the parts: axes, physics state, environment contract.
+
+One letter an axis, everywhere in the package:
+
+    B simulations    T steps        K objectives    N samples
+    J hinge joints (= actuators)    L links, the root first    P pool rows
+
+Units are SI: m, s, kg, N, Nm, rad. World frame: Z up. Quaternions: w x y z.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import jax
+from flax import struct
+
+
+@struct.dataclass
+class Kinematics:
+    """The part of the physics state that tasks read; the same on all engines, float32."""
+
+    qpos: jax.Array  # [B, 7 + J] root position and quaternion, then hinge angles (rad)
+    qvel: jax.Array  # [B, 6 + J] root linear (world), angular (local), hinge rates (rad/s)
+    link_position: jax.Array  # [B, L, 3] joint centre of every link, world (m)
+    link_quaternion: jax.Array  # [B, L, 4] link to world, wxyz
+    link_angular_velocity: jax.Array  # [B, L, 3] world frame (rad/s)
+    link_linear_velocity: jax.Array  # [B, L, 3] of the joint centre, world frame (m/s)
+    torque: jax.Array  # [B, J] actuator torque of the last substep (Nm)
+    finite: jax.Array  # [B] bool; False: the simulation failed and must be reset
+
+
+@struct.dataclass
+class PhysicsState:
+    """One batch of simulations: an opaque engine part and what tasks may read."""
+
+    engine: Any  # rows of the engine's own state, leading axis B
+    kinematics: Kinematics
+
+
+class Engine(Protocol):
+    """Steps B simulations; every method may be called inside jit."""
+
+    control_dt: float  # s, one control period
+
+    def reset(self, rows: Any) -> PhysicsState:
+        """The states of the given pool rows, as made by `settle` or `place`."""
+        ...
+
+    def step(self, state: PhysicsState, ctrl: jax.Array) -> PhysicsState:
+        """One control period with hinge targets ctrl[B, J] (rad)."""
+        ...
+
+    def select(self, mask: jax.Array, a: PhysicsState, b: PhysicsState) -> PhysicsState:
+        """Per simulation: a where mask[B], b elsewhere."""
+        ...
+
+
+@struct.dataclass
+class StepOutput:
+    """What one environment step returns; `final_observation` is from before any reset."""
+
+    observation: jax.Array  # [B, O] to act on next (after a reset, where one happened)
+    final_observation: jax.Array  # [B, O] reached by this step, before the reset
+    reward: jax.Array  # [B, K]
+    terminated: jax.Array  # [B] bool, failure: no value beyond this step
+    truncated: jax.Array  # [B] bool, time limit: the final observation's value bootstraps
+    metrics: dict[str, jax.Array]  # name -> [B], averaged over all steps
+    episode: dict[str, jax.Array]  # name -> [B], averaged where an episode ended and not NaN
+    extras: Any = None  # pytree [B, ...] that a learner stage needs (discriminator windows)
+
+
+class Environment(Protocol):
+    """A batch of B episodes with automatic resets; pure functions of their arguments."""
+
+    observation_size: int
+    action_size: int
+    num_objectives: int  # K
+
+    def init(self, world: Any, key: jax.Array, num_envs: int) -> Any:
+        """First state of B episodes: a pytree with a field `observation` [B, O]."""
+        ...
+
+    def step(self, world: Any, state: Any, action: jax.Array) -> tuple[Any, StepOutput]:
+        """One step of action[B, A]; episodes that end are reset inside.
+
+        Randomness comes from a key carried in the state.
+        """
+        ...
