@@ -103,6 +103,8 @@ class TaskConfig:
         share = self.stand_start + self.clip_start
         _require(0 <= share <= 1, "task.stand_start + task.clip_start", "between 0 and 1", share)
         _require(0 < self.filter <= 1, "task.filter", "more than 0 and at most 1", self.filter)
+        now = self.lookahead_s[:1] == (0.0,)
+        _require(now, "task.lookahead_s", "times that start with 0, the present", self.lookahead_s)
         _require(self.pool_size > 0, "task.pool_size", "more than 0", self.pool_size)
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import jax
+import jax.numpy as jnp
 from flax import struct
 
 
@@ -39,21 +40,32 @@ class PhysicsState:
 
 
 class Engine(Protocol):
-    """Steps B simulations; every method may be called inside jit."""
+    """Steps B simulations. `step` is pure and may be called inside jit; B may differ by call."""
 
+    name: str
     control_dt: float  # s, one control period
 
-    def reset(self, rows: Any) -> PhysicsState:
-        """The states of the given pool rows, as made by `settle` or `place`."""
+    def place(self, qpos: jax.Array, qvel: jax.Array) -> PhysicsState:
+        """States with the given qpos[P, 7 + J] and qvel[P, 6 + J]; pools are made of these."""
         ...
 
     def step(self, state: PhysicsState, ctrl: jax.Array) -> PhysicsState:
         """One control period with hinge targets ctrl[B, J] (rad)."""
         ...
 
-    def select(self, mask: jax.Array, a: PhysicsState, b: PhysicsState) -> PhysicsState:
-        """Per simulation: a where mask[B], b elsewhere."""
-        ...
+
+def select(mask: jax.Array, a: Any, b: Any) -> Any:
+    """Per simulation: the rows of pytree a where mask[B], those of b elsewhere."""
+
+    def pick(x: jax.Array, y: jax.Array) -> jax.Array:
+        return jnp.where(mask.reshape(mask.shape + (1,) * (x.ndim - 1)), x, y)
+
+    return jax.tree.map(pick, a, b)
+
+
+def take(rows: Any, index: jax.Array) -> Any:
+    """Rows of a pool pytree: leaves [P, ...] at index[B] give leaves [B, ...]."""
+    return jax.tree.map(lambda x: x[index], rows)
 
 
 @struct.dataclass

@@ -1,0 +1,63 @@
+"""From experience to samples: values, advantages and targets of one rollout."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+
+from getup_jax.algo import popart, ppo
+from getup_jax.algo.actor_critic import ActorCritic, normalized
+from getup_jax.algo.gae import gae
+from getup_jax.algo.ppo import Samples
+from getup_jax.algo.rollout import Transition
+from getup_jax.algo.state import LearnerState
+from getup_jax.config import PPOConfig
+
+
+def estimate(
+    model: ActorCritic, learner: LearnerState, transition: Transition, config: PPOConfig
+) -> tuple[LearnerState, Samples, jax.Array]:
+    """Score a rollout of [T, B] steps.
+
+    Returns:
+        The learner, with PopArt moved to the new targets where it is used; samples [T * B, ...];
+        and the explained variance of the values that the rollout was scored with, a scalar.
+    """
+    observation = normalized(learner.policy, transition.observation)
+    final_observation = normalized(learner.policy, transition.final_observation)
+    value = model.value(learner, observation)
+    advantage, target = gae(
+        transition.reward,
+        value,
+        model.value(learner, final_observation),
+        transition.terminated,
+        transition.truncated,
+        config.discount,
+        config.gae_lambda,
+    )
+    explained = ppo.explained_variance(value, target)
+    learner, target = normalize_targets(learner, target)
+    samples = Samples(
+        observation=observation,
+        action=transition.action,
+        log_prob=transition.log_prob,
+        advantage=ppo.standardize(advantage),
+        target=target,
+    )
+    return learner, jax.tree.map(_flatten, samples), explained
+
+
+def normalize_targets(learner: LearnerState, target: jax.Array) -> tuple[LearnerState, jax.Array]:
+    """Value targets [..., K] in the critic's units; without PopArt those are return units."""
+    if learner.popart is None:
+        return learner, target
+    statistics = popart.update(learner.popart, target)
+    critic = popart.rescale(learner.critic, learner.popart, statistics)
+    learner = dataclasses.replace(learner, critic=critic, popart=statistics)
+    return learner, popart.normalize(statistics, target)
+
+
+def _flatten(x: jax.Array) -> jax.Array:
+    """[T, B, ...] to [T * B, ...]."""
+    return x.reshape(-1, *x.shape[2:])

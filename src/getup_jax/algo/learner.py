@@ -1,0 +1,198 @@
+"""The learner: one iteration of PPO as a pure function of the world and the training state.
+
+    rollout -> values and GAE of each objective -> value targets (PopArt) -> epochs of minibatches
+    -> observation statistics
+
+The statistics move last, so that rollout, values and updates of an iteration see the same ones.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from getup_jax.algo import ppo, schedule
+from getup_jax.algo.actor_critic import ActorCritic, make_actor_critic, normalized, observe
+from getup_jax.algo.estimate import estimate
+from getup_jax.algo.rollout import Rollout, rollout, summarize
+from getup_jax.algo.state import LearnerState, PolicyState, TrainState, owned
+from getup_jax.algo.update import (
+    adapt_scale,
+    make_optimiser,
+    run_minibatches,
+    shuffled_minibatches,
+)
+from getup_jax.config import NetworkConfig, PPOConfig
+from getup_jax.nets import gaussian
+from getup_jax.types import Environment
+
+
+@struct.dataclass
+class Stage:
+    """The scheduled settings of one iteration."""
+
+    learning_rate: jax.Array  # [] with the adapted scale
+    action_std: jax.Array  # [A]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Learner:
+    """Networks and settings; every array is in TrainState or `world`. See `make_learner`."""
+
+    env: Environment
+    model: ActorCritic
+    config: PPOConfig
+    weights: tuple[float, ...]  # [K] of the objectives, their sum is 1
+    total_steps: int  # samples of the whole run
+
+    def init(self, world: Any, key: jax.Array) -> TrainState:
+        """The state before the first iteration."""
+        key_environment, key_learner, key_run = jax.random.split(key, 3)
+        state = TrainState(
+            learner=self.init_learner(key_learner),
+            environment=self.env.init(world, key_environment, self.config.num_envs),
+            key=key_run,
+            iteration=jnp.zeros((), jnp.int32),
+        )
+        return owned(state)
+
+    def init_learner(self, key: jax.Array) -> LearnerState:
+        """The learner's part of `init`; needs no world, so a checkpoint's form can be had alone."""
+        return self.model.init(key, self.config)
+
+    def iteration(self, world: Any, state: TrainState) -> tuple[TrainState, dict[str, jax.Array]]:
+        """One iteration: T * B new samples; metrics are float32 scalars.
+
+        Jit it once and donate the state: `jax.jit(learner.iteration, donate_argnums=1)`.
+        """
+        # Folded in, so that a run that resumes here draws what the unbroken one would have.
+        key_rollout, key_update = jax.random.split(jax.random.fold_in(state.key, state.iteration))
+        stage = self.stage(state)
+        collected = self._collect(world, state, stage, key_rollout)
+        learner, samples, explained = estimate(
+            self.model, state.learner, collected.transition, self.config
+        )
+        learner, metrics = self._improve(learner, samples, stage, key_update)
+        policy = observe(learner.policy, collected.transition.observation)
+        metrics |= {
+            "ppo/explained_variance": explained,
+            "ppo/learning_rate": stage.learning_rate,
+            "ppo/action_std": jnp.mean(stage.action_std),
+        }
+        state = TrainState(
+            learner=dataclasses.replace(learner, policy=policy),
+            environment=collected.environment,
+            key=state.key,
+            iteration=state.iteration + 1,
+        )
+        return state, metrics | summarize(collected)
+
+    def act(self, policy: PolicyState, observation: jax.Array) -> jax.Array:
+        """The mean action [..., A] for raw observations [..., O]; deterministic."""
+        return self.model.mean(policy.actor, normalized(policy, observation))
+
+    def value(self, learner: LearnerState, observation: jax.Array) -> jax.Array:
+        """Values [..., K] in return units for raw observations [..., O]."""
+        return self.model.value(learner, normalized(learner.policy, observation))
+
+    def stage(self, state: TrainState) -> Stage:
+        """Learning rate and exploration of the iteration that starts from `state`."""
+        config = self.config
+        # In float32, since the samples of a long run overflow int32.
+        share = config.num_envs * config.num_steps / self.total_steps
+        progress = state.iteration.astype(jnp.float32) * share
+
+        def scheduled(ends: tuple[float, ...]) -> jax.Array:
+            return schedule.value(ends[0], ends[-1], config.stages, progress)
+
+        return Stage(
+            learning_rate=scheduled(config.learning_rate) * state.learner.learning_rate_scale,
+            action_std=jnp.full(self.env.action_size, scheduled(config.action_std)),
+        )
+
+    def _collect(self, world: Any, state: TrainState, stage: Stage, key: jax.Array) -> Rollout:
+        """T steps with noise around the mean action."""
+
+        def policy(observation: jax.Array, key_action: jax.Array):
+            mean = self.act(state.learner.policy, observation)
+            action = gaussian.sample(key_action, mean, stage.action_std)
+            return action, gaussian.log_prob(action, mean, stage.action_std)
+
+        return rollout(self.env, world, state.environment, policy, key, self.config.num_steps)
+
+    def _improve(
+        self, learner: LearnerState, samples: ppo.Samples, stage: Stage, key: jax.Array
+    ) -> tuple[LearnerState, dict[str, jax.Array]]:
+        """All epochs of updates of actor and critic, and the next iteration's rate scale."""
+        config = self.config
+        num_samples = config.num_envs * config.num_steps
+
+        def loss(parameters: tuple[Any, Any], minibatch: ppo.Samples):
+            return self._loss(parameters, minibatch, stage.action_std)
+
+        (actor, critic), optimiser, metrics = run_minibatches(
+            loss,
+            make_optimiser(config.max_gradient_norm, stage.learning_rate),
+            (learner.policy.actor, learner.critic),
+            learner.optimiser,
+            samples,
+            shuffled_minibatches(key, config.epochs, num_samples, config.minibatch_size),
+        )
+        scale = adapt_scale(
+            learner.learning_rate_scale, metrics["ppo/clip_fraction"], config.target_clip_fraction
+        )
+        learner = LearnerState(
+            policy=dataclasses.replace(learner.policy, actor=actor),
+            critic=critic,
+            optimiser=optimiser,
+            popart=learner.popart,
+            learning_rate_scale=scale,
+        )
+        return learner, metrics
+
+    def _loss(
+        self, parameters: tuple[Any, Any], samples: ppo.Samples, std: jax.Array
+    ) -> tuple[jax.Array, dict[str, jax.Array]]:
+        """PPO's loss of (actor, critic) on one minibatch, and what to log of it."""
+        actor, critic = parameters
+        mean = self.model.mean(actor, samples.observation)
+        output = self.model.output(critic, samples.observation)
+        weights = jnp.asarray(self.weights, jnp.float32)
+        terms, metrics = ppo.loss_terms(mean, output, samples, std, weights, self.config.clip)
+        value_coefficient = self.config.value_coefficient
+        return ppo.total_loss(terms, value_coefficient, self.config.entropy_coefficient), metrics
+
+
+def make_learner(
+    env: Environment,
+    network_config: NetworkConfig,
+    ppo_config: PPOConfig,
+    total_steps: int,
+    weights: Sequence[float] | None = None,
+) -> Learner:
+    """A learner for the environment.
+
+    Args:
+        env: the batch of episodes.
+        network_config: of actor and critic.
+        ppo_config: see `PPOConfig`.
+        total_steps: samples of the whole run, for the schedules.
+        weights: [K] of the objectives, scaled here to a sum of 1; None: all the same.
+    """
+    count = env.num_objectives
+    weights = [1.0] * count if weights is None else list(weights)
+    if len(weights) != count or min(weights) < 0 or sum(weights) == 0:
+        raise ValueError(f"weights: expected {count} of at least 0, not all 0, got {weights}")
+    return Learner(
+        env=env,
+        model=make_actor_critic(env, network_config),
+        config=ppo_config,
+        weights=tuple(w / math.fsum(weights) for w in weights),
+        total_steps=total_steps,
+    )

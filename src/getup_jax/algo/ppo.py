@@ -1,0 +1,136 @@
+"""PPO-Clip for K objectives: the loss as named terms, and what to watch.
+
+Pure functions of arrays: N samples, actions of size A, K objectives. With K = 1 and weight 1 they
+are plain PPO (Schulman et al. 2017).
+"""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from getup_jax.nets import gaussian
+
+
+@struct.dataclass
+class Samples:
+    """What an update learns from: N samples, in any order."""
+
+    observation: jax.Array  # [N, O] normalised
+    action: jax.Array  # [N, A]
+    log_prob: jax.Array  # [N] of the action, by the policy that took it
+    advantage: jax.Array  # [N, K] standardised
+    target: jax.Array  # [N, K] in the critic's units
+
+
+@struct.dataclass
+class LossTerms:
+    """The terms of the loss before their coefficients, float32 scalars."""
+
+    policy: jax.Array
+    value: jax.Array
+    entropy: jax.Array  # nats; the loss falls as it grows
+
+
+def loss_terms(
+    mean: jax.Array,
+    output: jax.Array,
+    samples: Samples,
+    std: jax.Array,
+    weights: jax.Array,
+    clip: float,
+) -> tuple[LossTerms, dict[str, jax.Array]]:
+    """The terms on some samples, and what to log of them.
+
+    Args:
+        mean: [N, A], the actor's on the samples' observations.
+        output: [N, K], the critic's.
+        samples: what the old policy did.
+        std: [A], of the old and the new policy.
+        weights: [K] of the objectives, their sum is 1.
+        clip: half-width of the range of ratios.
+    """
+    log_ratio = gaussian.log_prob(samples.action, mean, std) - samples.log_prob
+    ratio = jnp.exp(log_ratio)
+    terms = LossTerms(
+        policy=policy_loss(ratio, samples.advantage, weights, clip),
+        value=value_loss(output, samples.target),
+        # Constant while the std is a setting: the term then moves the loss, not its gradient.
+        entropy=gaussian.entropy(std),
+    )
+    metrics = {
+        "loss/policy": terms.policy,
+        "loss/value": terms.value,
+        "ppo/clip_fraction": clip_fraction(ratio, clip),
+        "ppo/kl": approx_kl(log_ratio),
+    }
+    return terms, metrics
+
+
+def total_loss(terms: LossTerms, value_coefficient: float, entropy_coefficient: float) -> jax.Array:
+    """policy + value_coefficient * value - entropy_coefficient * entropy."""
+    return terms.policy + value_coefficient * terms.value - entropy_coefficient * terms.entropy
+
+
+def policy_loss(
+    ratio: jax.Array, advantage: jax.Array, weights: jax.Array, clip: float
+) -> jax.Array:
+    """The clipped surrogate, clipped for each objective and only then summed over them.
+
+        -mean_n sum_k w_k min(ratio_n A_nk, clip(ratio_n, 1 - clip, 1 + clip) A_nk)
+
+    Schulman et al. 2017, equation 7, with the weights of Xu et al. 2023, equation 7. Clipping the
+    summed advantage would be another objective: one objective's gain could keep the ratio moving
+    where another's is already clipped.
+
+    Args:
+        ratio: [N], new over old probability of the action.
+        advantage: [N, K], standardised for each objective.
+        weights: [K], their sum is 1.
+        clip: half-width of the range of ratios.
+    """
+    ratio = ratio[:, None]
+    clipped = jnp.clip(ratio, 1.0 - clip, 1.0 + clip)
+    surrogate = jnp.minimum(ratio * advantage, clipped * advantage)
+    return -jnp.mean(jnp.sum(weights * surrogate, axis=-1))
+
+
+def value_loss(output: jax.Array, target: jax.Array) -> jax.Array:
+    """Mean squared error over samples and objectives, [N, K] both; without value clipping.
+
+    There is no factor 1/2: the coefficient then means what it does in Stable-Baselines3 (Raffin et
+    al. 2021), with which the get-up paper trained.
+    """
+    return jnp.mean(jnp.square(output - target))
+
+
+def standardize(advantage: jax.Array) -> jax.Array:
+    """Every objective's advantages [..., K] to mean 0 and std 1 (Xu et al. 2023, equation 8)."""
+    axes = tuple(range(advantage.ndim - 1))
+    centred = advantage - jnp.mean(advantage, axes)
+    return centred / (jnp.std(advantage, axes) + 1e-8)
+
+
+def clip_fraction(ratio: jax.Array, clip: float) -> jax.Array:
+    """Share of the ratios [N] that lie outside 1 +- clip."""
+    return jnp.mean((jnp.abs(ratio - 1.0) > clip).astype(jnp.float32))
+
+
+def approx_kl(log_ratio: jax.Array) -> jax.Array:
+    """KL(old || new) from samples of old, mean of (ratio - 1) - log ratio (nats).
+
+    The estimator k3 of Schulman, "Approximating KL divergence" (2020): unbiased, never negative.
+    """
+    return jnp.mean(jnp.expm1(log_ratio) - log_ratio)
+
+
+def explained_variance(value: jax.Array, target: jax.Array) -> jax.Array:
+    """1 - var(target - value) / var(target), mean over K objectives, of [..., K].
+
+    1: the critic foresees every target; 0: no better than a constant; NaN: the targets are one.
+    """
+    axes = tuple(range(target.ndim - 1))
+    total = jnp.var(target, axes)
+    share = 1.0 - jnp.var(target - value, axes) / jnp.where(total > 0, total, jnp.nan)
+    return jnp.mean(share)

@@ -1,0 +1,198 @@
+"""Checkpoints: written whole or not at all, verified when read, the newest good one wins.
+
+    FOLDER/00000120/            one checkpoint, named by its iteration
+        checkpoint.json         format, iteration, steps, and the digest of every array file
+        config.yaml             the resolved settings
+        policy/                 orbax: {"policy": ..., "prior": ...}, loadable alone
+        learner/                orbax: {"state": the whole TrainState}
+
+A checkpoint is built in a hidden folder and renamed when all of it is on the disk, so that
+a killed process or a full disk leaves the previous one as it was.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import shutil
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from getup_jax import manifest
+from getup_jax.config import Config, ConfigError
+from getup_jax.manifest import DamagedError
+from getup_jax.paths import asset_path
+from getup_jax.settings import dump_yaml, load_config
+from getup_jax.storage import CheckpointError, from_nested, read_item, to_nested, write_item
+
+CHECKPOINTS = "checkpoints"  # folder of a run that holds its checkpoints
+POLICY, LEARNER = "policy", "learner"  # items of a checkpoint
+MAX_EXPORT_BYTES = 5_000_000
+
+
+@dataclasses.dataclass(frozen=True)
+class LoadedPolicy:
+    """What `load_policy` found; the pytrees are nested dicts of NumPy arrays, or None."""
+
+    policy: Any  # PolicyState by name; `from_nested` puts it into a template
+    prior: Any  # the pose prior that the task was built with
+    config: Config
+    metadata: dict[str, Any]  # iteration, steps and the like
+    path: Path  # the checkpoint's own folder
+
+
+@dataclasses.dataclass(frozen=True)
+class Restored:
+    """What `restore_learner` found."""
+
+    state: Any  # in the structure of the template
+    metadata: dict[str, Any]
+    path: Path
+
+
+def save_learner(
+    folder: Path,
+    iteration: int,
+    train_state: Any,
+    config: Config,
+    policy: Mapping[str, Any],
+    metadata: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write FOLDER/ITERATION and keep the newest `train.keep` in all; returns its path.
+
+    Args:
+        folder: the checkpoints folder of a run.
+        iteration: iterations done.
+        train_state: any pytree of arrays.
+        config: written as config.yaml.
+        policy: the light item: {"policy": pytree, "prior": pytree or None}.
+        metadata: what else checkpoint.json shall say; JSON values.
+
+    Raises CheckpointError where it could not be written; the others are then untouched.
+    """
+    items = {POLICY: to_nested(policy), LEARNER: to_nested({"state": train_state})}
+    final = folder / f"{iteration:08d}"
+    _write(final, items, config, {"iteration": iteration, **(metadata or {})})
+    _prune(folder, iteration, config.train.keep)
+    return final
+
+
+def restore_learner(folder: Path, template: Any) -> Restored:
+    """The newest undamaged TrainState of a checkpoints folder, in the template's structure."""
+    path, nested, metadata = _read_newest(find_checkpoints(folder), LEARNER)
+    state = from_nested({"state": template}, nested, str(path / LEARNER))["state"]
+    return Restored(state, metadata, path)
+
+
+def load_policy(path: str | Path) -> LoadedPolicy:
+    """The policy at `path`, with no need to know its shapes.
+
+    `path` is a run folder, its checkpoints folder, one checkpoint, an exported policy, or
+    the name of a shipped one. Raises CheckpointError that says what is wrong.
+    """
+    found, nested, metadata = _read_newest(find_checkpoints(path), POLICY)
+    try:
+        config = load_config(found / "config.yaml")
+    except ConfigError as error:
+        hint = "it was written with other settings; use the version of getup_jax that wrote it"
+        raise CheckpointError(f"{found}: {error}; {hint}") from None
+    return LoadedPolicy(nested["policy"], nested.get("prior"), config, metadata, found)
+
+
+def export_policy(source: str | Path, destination: str | Path) -> Path:
+    """Copy only the policy item of a checkpoint to a folder that `load_policy` reads."""
+    loaded, destination = load_policy(source), Path(destination)
+    if destination.exists() and not manifest.is_checkpoint(destination):
+        raise CheckpointError(f"{destination}: exists and is no checkpoint; choose another folder")
+    items = {POLICY: {"policy": loaded.policy, "prior": loaded.prior}}
+    _write(destination, items, loaded.config, loaded.metadata, MAX_EXPORT_BYTES)
+    return destination
+
+
+def steps(folder: Path) -> list[Path]:
+    """The checkpoints in a checkpoints folder, oldest first; unfinished ones are not."""
+    if not folder.is_dir():
+        return []
+    return sorted((p for p in folder.iterdir() if p.name.isdigit()), key=lambda p: int(p.name))
+
+
+def find_checkpoints(path: str | Path) -> list[Path]:
+    """The checkpoints that `path` means, oldest first; see `load_policy` for its forms."""
+    folder = Path(path)
+    if not folder.exists() and folder.parts[:-1] in ((), ("assets", CHECKPOINTS)):
+        folder = asset_path(CHECKPOINTS, folder.name)
+    if not folder.is_dir():
+        raise CheckpointError(f"{path}: no such folder; give a run folder or a checkpoint in one")
+    if manifest.is_checkpoint(folder) or folder.name.isdigit():
+        return [folder]
+    found = steps(folder / CHECKPOINTS) or steps(folder)
+    if not found:
+        raise CheckpointError(
+            f"{path}: holds no checkpoint; expected a run folder, a checkpoints folder, or a "
+            f"folder with {manifest.FILE}"
+        )
+    return found
+
+
+def _prune(folder: Path, iteration: int, keep: int) -> None:
+    """Keep `iteration` and undamaged ones before it, `keep` in all."""
+    good = []
+    # What cannot be read or removed now is looked at again after the next save.
+    with contextlib.suppress(OSError):
+        for step in reversed(steps(folder)):
+            # Newer ones were damaged, or the run would have gone on from there.
+            is_old = int(step.name) <= iteration
+            if is_old and len(good) < keep and not manifest.is_damaged(step, LEARNER):
+                good.append(step)
+            else:
+                manifest.remove_folder(step)
+
+
+def _read_newest(found: list[Path], item: str) -> tuple[Path, dict[str, Any], dict[str, Any]]:
+    """Path, arrays and metadata of the newest checkpoint whose item is undamaged."""
+    for older, path in reversed(list(zip([None, *found], found, strict=False))):
+        try:
+            return path, *_read(path, item)
+        except DamagedError as error:
+            if older is None:
+                raise
+            warnings.warn(f"{error}; going back to {older}", RuntimeWarning, stacklevel=3)
+    raise CheckpointError("no checkpoint given")
+
+
+def _read(path: Path, item: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Arrays and metadata of one item, after every file of it was checked."""
+    metadata = manifest.verify(path, item)
+    try:
+        return read_item(path / item), metadata
+    except Exception as error:
+        raise DamagedError(f"{path / item}: cannot be read: {error}") from error
+
+
+def _write(
+    final: Path,
+    items: Mapping[str, dict[str, Any]],
+    config: Config,
+    metadata: Mapping[str, Any],
+    max_bytes: int | None = None,
+) -> None:
+    """Write a checkpoint folder, all or nothing."""
+    final = final.absolute()
+    partial = final.parent / f"{manifest.PARTIAL}{final.name}"
+    try:
+        final.parent.mkdir(parents=True, exist_ok=True)
+        manifest.remove_unfinished(final.parent)
+        partial.mkdir()
+        for name, nested in items.items():
+            write_item(partial / name, nested)
+        (partial / "config.yaml").write_text(dump_yaml(config), encoding="utf-8")
+        size = manifest.write(partial, metadata)
+        if max_bytes is not None and size > max_bytes:
+            raise ValueError(f"{size} bytes, at most {max_bytes} are allowed")
+        manifest.replace_folder(partial, final)
+    except Exception as error:
+        shutil.rmtree(partial, ignore_errors=True)
+        hint = "free disk space or choose another folder; earlier checkpoints are untouched"
+        raise CheckpointError(f"{final}: could not be saved: {error}; {hint}") from error

@@ -1,0 +1,141 @@
+"""The commands getup-train, getup-eval and getup-motion.
+
+What imports JAX is imported where it is used, after the arguments and the settings were
+checked, so that a typing mistake is answered at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from getup_jax import __version__, runfolder
+from getup_jax.settings import find_config, load_config
+
+_TRAIN_EXAMPLES = """\
+examples:
+  getup-train configs/flat.yaml                        train; writes into runs/flat
+  getup-train configs/flat.yaml --resume               continue where it stopped
+  getup-train flat ppo.num_envs=256 seed=1 --run runs/seed1
+                                                       change settings, keep the file
+
+A run folder holds config.yaml (every setting), metrics.jsonl (one line an iteration) and
+checkpoints/. Ctrl-C and SIGTERM save and exit; a second Ctrl-C exits at once.
+"""
+
+_EVAL_EXAMPLES = """\
+examples:
+  getup-eval                                           the shipped policy
+  getup-eval --ckpt runs/flat --episodes 200           the newest checkpoint of a run
+  getup-eval --ckpt runs/flat --video getup.mp4        and film it
+"""
+
+
+def train_main(argv: Sequence[str] | None = None) -> int:
+    """`getup-train`; returns the exit code."""
+    return _guard(_train, _train_parser().parse_intermixed_args(argv))
+
+
+def eval_main(argv: Sequence[str] | None = None) -> int:
+    """`getup-eval`; returns the exit code."""
+    return _guard(_evaluate, _eval_parser().parse_args(argv))
+
+
+def motion_main(argv: Sequence[str] | None = None) -> int:
+    """`getup-motion`; returns the exit code."""
+    return _guard(_motion, argv)
+
+
+def _train(args: argparse.Namespace) -> int:
+    config = load_config(args.config, args.overrides)
+    folder = args.run or Path("runs") / find_config(args.config).stem
+    runfolder.check(folder, args.resume)
+    if not args.quiet:
+        print(f"getup-train {__version__}: {args.config} into {folder}", flush=True)
+    from getup_jax.train import run
+
+    number = run(config, folder, args.resume, args.quiet)
+    return 0 if number is None else 128 + number
+
+
+def _evaluate(args: argparse.Namespace) -> int:
+    from getup_jax.evaluate import evaluate_command
+
+    return evaluate_command(args) or 0
+
+
+def _motion(argv: Sequence[str] | None) -> int:
+    from getup_jax.motion.command import main
+
+    return main(argv) or 0
+
+
+def _guard(command: Callable[..., int], argument: object) -> int:
+    """Run a command; an error of ours is one line for the user, any other a traceback."""
+    warnings.showwarning = _show_warning
+    try:
+        return command(argument)
+    except ValueError as error:
+        # ConfigError, CheckpointError, MotionError and the like: all written for the user.
+        if not type(error).__module__.startswith("getup_jax."):
+            raise
+        print(f"{type(error).__name__}: {error}", file=sys.stderr)
+        return 2
+
+
+def _show_warning(message: Warning | str, *_: object) -> None:
+    print(f"warning: {message}", file=sys.stderr)
+
+
+def _train_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="getup-train",
+        description="Train a policy that gets up from the floor.",
+        epilog=_TRAIN_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("config", metavar="CONFIG", help="a YAML file, or the name of a shipped one such as flat")
+    add(
+        "overrides",
+        metavar="key=value",
+        nargs="*",
+        help="settings that replace the file's, such as ppo.num_envs=256; all of them, with "
+        "their defaults and meaning, are in getup_jax/config.py",
+    )
+    add("--run", type=Path, metavar="FOLDER", help="the run's folder (default: runs/NAME)")
+    add("--resume", action="store_true", help="continue the run that is in the folder, if any")
+    add("--quiet", action="store_true", help="print only warnings and errors")
+    return parser
+
+
+def _eval_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="getup-eval",
+        description="Let a trained policy get up many times, and report how well it does.",
+        epilog=_EVAL_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add(
+        "--ckpt",
+        metavar="PATH",
+        default="flat",
+        help="a run folder, a checkpoint, or the name of a shipped policy (default: flat)",
+    )
+    add("--episodes", type=_positive, default=100, metavar="N", help="how many (default: 100)")
+    add("--seed", type=int, default=0, metavar="S", help="of the starts (default: 0)")
+    add("--json", type=Path, metavar="FILE", help="write the results to this file, too")
+    add("--video", type=Path, metavar="FILE", help="film some episodes; an .mp4 file")
+    add("--engine", metavar="E", help="native, mjx or mjx-warp (default: as for training)")
+    return parser
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"expected at least 1, got {text}")
+    return number

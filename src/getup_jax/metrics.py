@@ -1,0 +1,117 @@
+"""metrics.jsonl: one JSON object a line, the one consistent history of a run.
+
+Every line has `iteration`, `steps` and `wall_s` beside the metrics; NaN is null. TensorBoard
+gets the same numbers where it is asked for.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from getup_jax.config import ConfigError
+
+FILE = "metrics.jsonl"
+_OWN = ("iteration", "steps", "wall_s")
+
+
+class MetricsWriter:
+    """Appends lines to FOLDER/metrics.jsonl, each flushed when it is written.
+
+    Lines past `resume_iteration` are dropped first, and all of them where that is 0, so that
+    a resumed run writes each iteration once.
+    """
+
+    def __init__(self, folder: Path, resume_iteration: int = 0, tensorboard: bool = False) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._path = folder / FILE
+        kept = [row for row in _rows(self._path) if row["iteration"] <= resume_iteration]
+        _rewrite(self._path, kept)
+        self.wall_s: float = kept[-1]["wall_s"] if kept else 0.0  # s, of the last line
+        self._board = None
+        if tensorboard:
+            # What an earlier run wrote past the last kept line is hidden.
+            purge = kept[-1]["steps"] + 1 if kept else 0
+            writer = tensorboard_module().SummaryWriter
+            self._board = writer(str(folder / "tensorboard"), purge_step=purge)
+        self._file = self._path.open("a", encoding="utf-8")
+
+    def write(
+        self, iteration: int, steps: int, wall_s: float, metrics: Mapping[str, float]
+    ) -> None:
+        """Add one line; `wall_s` counts from the start of the whole run."""
+        taken = [name for name in _OWN if name in metrics]
+        if taken:
+            raise ValueError(f"metrics: the names {taken} are the line's own; rename them")
+        values = {name: _finite(value) for name, value in metrics.items()}
+        row = {"iteration": iteration, "steps": steps, "wall_s": round(wall_s, 3), **values}
+        self._file.write(json.dumps(row, allow_nan=False) + "\n")
+        self._file.flush()
+        self.wall_s = row["wall_s"]
+        if self._board is not None:
+            for name, value in values.items():
+                if value is not None:
+                    self._board.add_scalar(name, value, steps)
+
+    def close(self) -> None:
+        """Close the files."""
+        self._file.close()
+        if self._board is not None:
+            self._board.close()
+
+    def __enter__(self) -> MetricsWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def read_metrics(path: str | Path) -> list[dict[str, Any]]:
+    """The lines of a run folder's metrics.jsonl (or of that file), nulls as NaN.
+
+    Raises FileNotFoundError; a last line that a killed run left unfinished is skipped.
+    """
+    path = Path(path) / FILE if Path(path).is_dir() else Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: no such file; expected a run folder or its {FILE}")
+    return [{k: math.nan if v is None else v for k, v in row.items()} for row in _rows(path)]
+
+
+def _rows(path: Path) -> list[dict[str, Any]]:
+    """The parsed lines; none where there is no file."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    rows = []
+    for number, line in enumerate(lines, start=1):
+        try:
+            rows.append(json.loads(line))
+        except ValueError as error:
+            if number < len(lines):
+                problem = f"{path}, line {number}: not a JSON object: {error}"
+                raise ValueError(f"{problem}; remove the line or start a new run") from None
+    return rows
+
+
+def _rewrite(path: Path, rows: list[dict[str, Any]]) -> None:
+    """Replace the file's lines in one step: a reader sees all old or all new ones."""
+    fresh = path.with_suffix(".new")
+    fresh.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+    os.replace(fresh, path)
+
+
+def _finite(value: float) -> float | None:
+    value = float(value)
+    return value if math.isfinite(value) else None
+
+
+def tensorboard_module() -> Any:
+    """The module tensorboardX, or ConfigError with an install hint."""
+    try:
+        return importlib.import_module("tensorboardX")
+    except ImportError:
+        hint = "pip install 'getup-jax[tensorboard]'"
+        raise ConfigError(f"train.tensorboard: needs tensorboardX; install it: {hint}") from None

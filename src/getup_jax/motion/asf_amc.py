@@ -1,0 +1,2 @@
+"""Placeholder"""
+def read_amc(path): raise NotImplementedError

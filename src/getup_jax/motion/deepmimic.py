@@ -1,0 +1,120 @@
+"""DeepMimic motion files: JSON {Loop, Frames} with 44 columns a frame.
+
+Columns: duration (s), root position (Y up, m), root quaternion, then per joint a quaternion
+(wxyz) or, for knees and elbows, one angle about Z. The skeleton is DeepMimic's humanoid3d:
+in the zero pose it stands facing +X with its arms down, its right side at +Z.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from getup_jax.motion.bvh import Y_UP
+from getup_jax.motion.clips import MotionError
+from getup_jax.motion.skeleton import Recording, at_times, turned
+
+COLUMNS = 44
+# name, parent, place in the parent (m), columns: 4 for a quaternion, 1 for a hinge angle
+_JOINTS: tuple[tuple[str, int, tuple[float, float, float], int], ...] = (
+    ("root", -1, (0.0, 0.0, 0.0), 4),
+    ("chest", 0, (0.0, 0.236151, 0.0), 4),
+    ("neck", 1, (0.0, 0.223894, 0.0), 4),
+    ("right_hip", 0, (0.0, 0.0, 0.084887), 4),
+    ("right_knee", 3, (0.0, -0.421546, 0.0), 1),
+    ("right_ankle", 4, (0.0, -0.40987, 0.0), 4),
+    ("right_shoulder", 1, (-0.02405, 0.24350, 0.18311), 4),
+    ("right_elbow", 6, (0.0, -0.274788, 0.0), 1),
+    ("left_hip", 0, (0.0, 0.0, -0.084887), 4),
+    ("left_knee", 8, (0.0, -0.421546, 0.0), 1),
+    ("left_ankle", 9, (0.0, -0.40987, 0.0), 4),
+    ("left_shoulder", 1, (-0.02405, 0.24350, -0.18311), 4),
+    ("left_elbow", 11, (0.0, -0.274788, 0.0), 1),
+)
+_WRIST = (0.0, -0.258947, 0.0)
+
+
+def read_deepmimic(path: str | Path) -> Recording:
+    """The motion of a DeepMimic file at the rate of its first frame."""
+    path = Path(path)
+    try:
+        return decode(path, json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, UnicodeDecodeError) as error:
+        raise MotionError(f"{path}: cannot be read: {error}") from None
+    except json.JSONDecodeError as error:
+        raise MotionError(f"{path.name}, line {error.lineno}: broken JSON: {error.msg}") from None
+
+
+def decode(path: Path, content: Any) -> Recording:
+    """A parsed file, {Loop, Frames}."""
+    rows = content.get("Frames") if isinstance(content, dict) else None
+    if not isinstance(rows, list) or not rows:
+        raise MotionError(f"{path.name}: expected {{Loop, Frames}} with at least one frame")
+    for number, row in enumerate(rows):
+        if not isinstance(row, list) or len(row) != COLUMNS:
+            got = len(row) if isinstance(row, list) else type(row).__name__
+            raise MotionError(f"{path.name}, frame {number}: expected {COLUMNS} values, got {got}")
+    values = _numbers(path, rows)
+    durations = values[:-1, 0]
+    if len(values) > 1 and (durations <= 0).any():
+        bad = int(np.argmax(durations <= 0))
+        raise MotionError(
+            f"{path.name}, frame {bad}: expected a duration above 0 s, got {durations[bad]}"
+        )
+    return _recording(path, values)
+
+
+def _numbers(path: Path, rows: list[list[Any]]) -> np.ndarray:
+    for number, row in enumerate(rows):
+        for column, value in enumerate(row):
+            if not isinstance(value, int | float) or not np.isfinite(value):
+                raise MotionError(
+                    f"{path.name}, frame {number}, column {column}: expected a finite number, "
+                    f"got {value!r}"
+                )
+    return np.array(rows, np.float64)
+
+
+def _recording(path: Path, values: np.ndarray) -> Recording:
+    frames, count = len(values), len(_JOINTS)
+    rotations, column = np.empty((frames, count, 4)), 4
+    for joint, (*_, width) in enumerate(_JOINTS):
+        part = values[:, column : column + width]
+        rotations[:, joint] = part if width == 4 else _about_z(part[:, 0])
+        column += width
+    rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+    offsets = np.array([joint[2] for joint in _JOINTS])
+    translations = np.tile(offsets, (frames, 1, 1))
+    translations[:, 0] = values[:, 1:4]
+    names = tuple(joint[0] for joint in _JOINTS)
+    raw = Recording(
+        name=path.stem,
+        fps=1.0 / values[0, 0] if values[0, 0] > 0 else 30.0,
+        joint_names=names,
+        parents=tuple(joint[1] for joint in _JOINTS),
+        offsets=offsets,
+        translations=translations,
+        rotations=rotations,
+        ends={names.index(f"{side}_elbow"): np.array(_WRIST) for side in ("left", "right")},
+        source=str(path),
+    )
+    return turned(_even(raw, values[:, 0]), Y_UP)
+
+
+def _even(recording: Recording, durations: np.ndarray) -> Recording:
+    """Frames of unequal duration at one rate."""
+    if len(durations) < 3 or np.ptp(durations[:-1]) < 1e-3 * durations[0]:
+        return recording
+    times = np.concatenate([[0.0], np.cumsum(durations[:-1])])
+    fps = 1.0 / float(np.median(durations[:-1]))
+    new = np.arange(int(times[-1] * fps + 1e-6) + 1) / fps
+    return at_times(recording, times, new, fps)
+
+
+def _about_z(angle: np.ndarray) -> np.ndarray:
+    zero = np.zeros_like(angle)
+    return Rotation.from_rotvec(np.stack([zero, zero, angle], axis=-1)).as_quat(scalar_first=True)

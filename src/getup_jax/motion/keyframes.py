@@ -1,0 +1,14 @@
+"""Authored motions: the public names of the keyframe files and of the library made from them."""
+
+from getup_jax.motion.authored import authored_poses, load_authored
+from getup_jax.motion.keyframe_clip import clip_from_keyframes
+from getup_jax.motion.keyframe_file import Keyframe, KeyframeMotion, read_keyframes
+
+__all__ = [
+    "Keyframe",
+    "KeyframeMotion",
+    "authored_poses",
+    "clip_from_keyframes",
+    "load_authored",
+    "read_keyframes",
+]

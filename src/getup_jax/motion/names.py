@@ -1,0 +1,147 @@
+"""Which joint of a recording is which of our links.
+
+Links are named as in the shipped character. Limbs are found by the words in a joint's name;
+the spine, the neck and the head by their place in the tree, since formats count vertebrae
+differently. A map {joint: link} in YAML or JSON overrides both; null ignores a joint.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import yaml
+
+from getup_jax.motion.clips import MotionError
+
+# Words for a limb's joint, best first, after the side is taken off.
+_LIMBS: dict[str, tuple[str, ...]] = {
+    "thigh": ("thigh", "upleg", "upperleg", "femur", "hip"),
+    "shin": ("shin", "leg", "lowerleg", "knee", "tibia", "calf"),
+    "foot": ("foot", "ankle"),
+    "toe": ("toe", "toes", "toebase", "ball"),
+    "shoulder": ("shoulder", "collar", "clavicle"),
+    "arm": ("arm", "upperarm", "uparm", "humerus"),
+    "forearm": ("forearm", "lowerarm", "elbow", "radius"),
+    "hand": ("hand", "wrist"),
+}
+_MIDDLE: dict[str, tuple[str, ...]] = {
+    "pelvis": ("pelvis", "hips", "hip", "root"),
+    "head": ("head",),
+    "neck": ("neck1", "upperneck", "neck", "lowerneck"),  # CMU's Neck lies on the spine
+}
+_SPINE = ("spine_low", "spine_mid", "spine_upper")
+LINKS = (
+    *("pelvis", *_SPINE, "neck", "head"),
+    *(f"{limb}_{side}" for side in "lr" for limb in _LIMBS),
+)
+REQUIRED = (
+    "pelvis",
+    *(f"{limb}_{side}" for side in "lr" for limb in ("thigh", "shin", "foot", "arm", "forearm")),
+)
+
+
+def map_names(
+    joints: Sequence[str], parents: Sequence[int], user: Mapping[str, str | None] | None = None
+) -> dict[str, int]:
+    """{link: joint index} for the joints that are recognised, `user` first."""
+    words = [_words(name) for name in joints]
+    found = _user_links(joints, user or {})
+    taken = set(found.values()) | {i for i, name in enumerate(joints) if name in (user or {})}
+    wanted = [(link, "", alias) for link, alias in _MIDDLE.items()]
+    wanted += [(f"{k}_{side}", side, alias) for side in "lr" for k, alias in _LIMBS.items()]
+    for link, side, aliases in wanted:
+        free = {words[i]: i for i in reversed(range(len(joints))) if i not in taken}
+        index = next((free[side, alias] for alias in aliases if (side, alias) in free), None)
+        if index is not None and link not in found:
+            found[link] = index
+            taken.add(index)
+    for side in "lr":  # formats without a clavicle call the upper arm's joint a shoulder
+        if f"arm_{side}" not in found and f"shoulder_{side}" in found:
+            found[f"arm_{side}"] = found.pop(f"shoulder_{side}")
+    return _add_trunk(found, parents, taken)
+
+
+def require_links(source: str, joints: Sequence[str], found: Mapping[str, int]) -> None:
+    """MotionError that lists what is missing, what is unknown and how to give a map."""
+    missing = [link for link in REQUIRED if link not in found]
+    if missing:
+        raise MotionError(
+            f"{source}: no joint found for {', '.join(missing)}; unknown joints: "
+            f"{', '.join(unknown_joints(joints, found)) or 'none'}; give --names MAP, a YAML "
+            f"file with lines such as '{joints[0]}: pelvis' (links: {', '.join(LINKS)})"
+        )
+
+
+def unknown_joints(joints: Sequence[str], found: Mapping[str, int]) -> list[str]:
+    """The joints that no link uses."""
+    used = set(found.values())
+    return [name for i, name in enumerate(joints) if i not in used]
+
+
+def read_map(path: str | Path) -> dict[str, str | None]:
+    """A user's {joint: link} file, YAML or JSON."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+        values = json.loads(text) if str(path).endswith(".json") else yaml.safe_load(text)
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        raise MotionError(f"{path}: not a readable name map: {error}") from None
+    if not isinstance(values, dict):
+        raise MotionError(f"{path}: expected lines such as 'LeftUpLeg: thigh_l', got {values!r}")
+    bad = sorted(str(v) for v in values.values() if v is not None and v not in LINKS)
+    if bad:
+        raise MotionError(f"{path}: unknown links {', '.join(bad)}; links are {', '.join(LINKS)}")
+    return {str(key): value for key, value in values.items()}
+
+
+def _user_links(joints: Sequence[str], user: Mapping[str, str | None]) -> dict[str, int]:
+    absent = [name for name in user if name not in joints]
+    if absent:
+        raise MotionError(
+            f"name map: no joints {', '.join(absent)}; the file has {', '.join(joints)}"
+        )
+    return {link: list(joints).index(name) for name, link in user.items() if link is not None}
+
+
+def _words(name: str) -> tuple[str, str]:
+    """(side, rest): `mixamorig:LeftUpLeg`, `UpperLeg_L`, `thigh_l` and `lfemur` alike."""
+    name = re.sub(r"^(.*[:|]|joint_|jnt_|bip01[ _]?)", "", name, flags=re.IGNORECASE)
+    parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)
+    parts = [part.lower() for part in parts]
+    for mark, side in (("left", "l"), ("right", "r"), ("l", "l"), ("r", "r")):
+        if mark in parts:
+            parts.remove(mark)
+            return side, "".join(parts)
+    bare = "".join(parts)
+    limbs = {alias for aliases in _LIMBS.values() for alias in aliases}
+    if bare[:1] in ("l", "r") and bare[1:] in limbs:
+        return bare[0], bare[1:]
+    return "", bare
+
+
+def _add_trunk(
+    found: dict[str, int], parents: Sequence[int], taken: set[int]
+) -> dict[str, int]:
+    """The spine is what lies between the pelvis and the joint that carries the arms."""
+    if "pelvis" not in found or "arm_l" not in found:
+        return found
+    ends = [found.get(f"shoulder_{s}", found.get(f"arm_{s}")) for s in "lr"]
+    paths = [_path(end, found["pelvis"], parents) for end in ends if end is not None]
+    spine = [joint for joint in paths[0][:-1] if all(joint in path[:-1] for path in paths)]
+    spine = [joint for joint in spine if joint not in taken]
+    low, *mid = spine[:-1] or [None]
+    for link, joint in zip(_SPINE, (low, mid[-1] if mid else None, *spine[-1:]), strict=False):
+        if joint is not None:
+            found.setdefault(link, joint)
+    return found
+
+
+def _path(joint: int, ancestor: int, parents: Sequence[int]) -> list[int]:
+    """Joints from below the ancestor down to the joint."""
+    path = []
+    while joint not in (ancestor, -1):
+        path.append(joint)
+        joint = parents[joint]
+    return path[::-1]

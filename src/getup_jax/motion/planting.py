@@ -1,0 +1,155 @@
+"""Planted contacts: feet, knees and hands stay put while the body moves between keyframes.
+
+Interpolated angles let a foot on the floor drift by centimetres. A damped least-squares inverse
+kinematics over the whole body brings every planted point back to where the keyframes put it,
+and a vertical shift then rests the lowest geom on the floor.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from getup_jax.physics.character import CharacterSpec
+
+
+@dataclasses.dataclass(frozen=True)
+class Contact:
+    """A point of a link that can be planted on the floor."""
+
+    link: str
+    point: tuple[float, float, float]  # m, link frame
+    turns: bool  # whether the link may turn about the point
+
+
+_SIDES = ("l", "r")
+CONTACTS: dict[str, Contact] = {
+    f"{name}_{side}": Contact(f"{link}_{side}", point, turns)
+    for side in _SIDES
+    for name, link, point, turns in (
+        ("foot", "foot", (0.055, 0.0, -0.08), False),
+        ("toes", "foot", (0.18, 0.0, -0.08), True),
+        ("heel", "foot", (-0.07, 0.0, -0.08), True),
+        ("knee", "shin", (0.0, 0.0, -0.01), True),
+        ("shin", "shin", (0.0, 0.0, -0.18), False),
+        ("hand", "hand", (0.0, 0.0, -0.08), True),
+        ("elbow", "forearm", (0.0, 0.0, 0.0), True),
+    )
+}
+# A flat foot that rolls onto its toes keeps them where they were.
+_IMPLIED = {
+    f"{whole}_{side}": tuple(f"{part}_{side}" for part in parts)
+    for side in _SIDES
+    for whole, parts in (("foot", ("toes", "heel")), ("shin", ("knee",)))
+}
+_TURN_WEIGHT = 0.3  # m/rad, orientation errors against position errors
+_ITERATIONS = 5
+_TOLERANCE_M = 2e-4
+_DAMPING = 1e-3
+
+
+def held_contacts(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
+    """The contacts that stay put between two keyframes."""
+    whole = set(first) & set(second)
+    parts = {p for name in first for p in (name, *_IMPLIED.get(name, ()))}
+    parts &= {p for name in second for p in (name, *_IMPLIED.get(name, ()))}
+    redundant = {p for name in whole for p in _IMPLIED.get(name, ())}
+    return tuple(sorted(parts - redundant))
+
+
+class Planter:
+    """Solves single frames; holds the scratch data of one character."""
+
+    def __init__(self, character: CharacterSpec) -> None:
+        self._model = character.model
+        self._data = mujoco.MjData(self._model)
+        self._cost = _motion_cost(character)
+        self._lower, self._upper = character.joint_lower, character.joint_upper
+        self._bodies = {name: self._model.body(c.link).id for name, c in CONTACTS.items()}
+
+    def poses(self, qpos: np.ndarray, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Point (3) and link rotation (3x3, flat) of each contact in a pose."""
+        self._place(qpos)
+        return {name: np.concatenate([self._point(name), self._turn(name)]) for name in names}
+
+    def solve(self, qpos: np.ndarray, targets: dict[str, np.ndarray]) -> np.ndarray:
+        """The pose nearest to qpos [7 + J] whose contacts meet their targets."""
+        qpos = np.array(qpos, np.float64)
+        for _ in range(_ITERATIONS):
+            self._place(qpos)
+            jacobian, error = self._linearize(targets)
+            if np.abs(error).max() < _TOLERANCE_M:
+                break
+            weighted = jacobian / self._cost
+            gram = weighted @ jacobian.T + _DAMPING * np.eye(len(error))
+            step = weighted.T @ np.linalg.solve(gram, error)
+            mujoco.mj_integratePos(self._model, qpos, step, 1.0)
+            qpos[7:] = np.clip(qpos[7:], self._lower, self._upper)
+        return qpos
+
+    def rest_on_floor(self, qpos: np.ndarray) -> np.ndarray:
+        """The pose moved vertically until its lowest geom touches z = 0."""
+        self._place(qpos)
+        qpos = np.array(qpos, np.float64)
+        qpos[2] -= geom_bottoms(self._model, self._data).min()
+        return qpos
+
+    def _place(self, qpos: np.ndarray) -> None:
+        self._data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+
+    def _linearize(self, targets: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Jacobian [N, 6 + J] and error [N] (m) of every constrained coordinate."""
+        rows, errors = [], []
+        for name, target in targets.items():
+            point, body = self._point(name), self._bodies[name]
+            move, turn = np.empty((3, self._model.nv)), np.empty((3, self._model.nv))
+            mujoco.mj_jac(self._model, self._data, move, turn, point, body)
+            rows.append(move)
+            errors.append(target[:3] - point)
+            if not CONTACTS[name].turns:
+                rows.append(_TURN_WEIGHT * turn)
+                errors.append(_TURN_WEIGHT * _turn_error(target[3:], self._data.xmat[body]))
+        return np.concatenate(rows), np.concatenate(errors)
+
+    def _point(self, name: str) -> np.ndarray:
+        body = self._bodies[name]
+        return self._data.xpos[body] + self._turn(name).reshape(3, 3) @ CONTACTS[name].point
+
+    def _turn(self, name: str) -> np.ndarray:
+        return self._data.xmat[self._bodies[name]].copy()
+
+
+def lowest_points(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """Ids [G] and lowest points [G, 3] (m) of every colliding geom but the floor."""
+    solid = np.flatnonzero((model.geom_contype != 0) & (model.geom_bodyid != 0))
+    axes = data.geom_xmat[solid].reshape(-1, 3, 3)
+    size, kind = model.geom_size[solid], model.geom_type[solid][:, None]
+    down = -np.sign(axes[:, 2, :])
+    capsule = (axes[:, :, 2] * (down[:, 2] * size[:, 1])[:, None]) - size[:, :1] * [0, 0, 1]
+    box = np.einsum("gij,gj->gi", axes, down * size)
+    sphere = -size[:, :1] * [0, 0, 1]
+    is_capsule, is_box = kind == mujoco.mjtGeom.mjGEOM_CAPSULE, kind == mujoco.mjtGeom.mjGEOM_BOX
+    return solid, data.geom_xpos[solid] + np.where(is_capsule, capsule, np.where(is_box, box, sphere))
+
+
+def geom_bottoms(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """Height of the lowest point of every colliding geom but the floor, [G] (m)."""
+    return lowest_points(model, data)[1][:, 2]
+
+
+def _turn_error(target: np.ndarray, current: np.ndarray) -> np.ndarray:
+    """Rotation vector (rad, world) from one rotation matrix to another, for small angles."""
+    turn = target.reshape(3, 3) @ current.reshape(3, 3).T
+    skew = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    return 0.5 * skew
+
+
+def _motion_cost(character: CharacterSpec) -> np.ndarray:
+    """What a unit of motion costs, [6 + J]: limbs move before the trunk, the trunk before the root."""
+    trunk = np.array([name.startswith(("spine", "neck", "head")) for name in character.joint_names])
+    return np.concatenate([np.full(3, 20.0), np.full(3, 20.0), np.where(trunk, 10.0, 1.0)])

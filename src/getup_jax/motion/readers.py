@@ -1,0 +1,66 @@
+"""Any motion file into a Recording: the format is told by suffix and content."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+from getup_jax.motion import asf_amc, bvh, composite_json, deepmimic
+from getup_jax.motion.clips import MotionError
+from getup_jax.motion.skeleton import Recording
+
+SUFFIXES = (".bvh", ".txt", ".json", ".amc")
+
+
+@dataclasses.dataclass(frozen=True)
+class ReadOptions:
+    """What files do not say about themselves."""
+
+    up: str = "y"  # y | z: the vertical axis of BVH files
+    allow_short: bool = False  # take BVH files with another row count than the header says
+
+
+def read_motion(path: str | Path, options: ReadOptions = ReadOptions()) -> Recording:  # noqa: B008
+    """The recording in a file, Z up, lengths in the file's own unit."""
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if not path.is_file():
+        raise MotionError(f"{path}: no such file")
+    if suffix == ".bvh":
+        return bvh.read_bvh(path, bvh.BvhOptions(up=options.up, allow_short=options.allow_short))
+    if suffix == ".amc":
+        return asf_amc.read_amc(path)
+    if suffix in (".txt", ".json"):
+        return _read_json(path)
+    raise MotionError(f"{path.name}: unknown format {suffix!r}; known are {', '.join(SUFFIXES)}")
+
+
+def motion_files(folder: Path) -> list[Path]:
+    """The motion files below a folder, sorted; those that only look alike are left out."""
+    found = [file for file in folder.rglob("*") if file.suffix.lower() in (*SUFFIXES, ".npz")]
+    return sorted(file for file in found if not _is_other_text(file))
+
+
+def _read_json(path: Path) -> Recording:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        raise MotionError(f"{path.name}: expected a text file, got binary data") from None
+    except json.JSONDecodeError as error:
+        raise MotionError(f"{path.name}, line {error.lineno}: broken JSON: {error.msg}") from None
+    if isinstance(content, dict) and "Frames" in content:
+        return deepmimic.decode(path, content)
+    if isinstance(content, dict) and "frames" in content:
+        return composite_json.decode(path, content)
+    raise MotionError(
+        f"{path.name}: expected DeepMimic's {{Loop, Frames}} or {{fps, frames}}, got neither"
+    )
+
+
+def _is_other_text(file: Path) -> bool:
+    """A .txt or .json without the word `frames` near its start is no motion."""
+    if file.suffix.lower() not in (".txt", ".json"):
+        return False
+    with file.open("rb") as stream:
+        return b"frames" not in stream.read(4096).lower()

@@ -1,0 +1,182 @@
+"""Where each link of a character should be: the recording's pose on the character's bones."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+
+from getup_jax.motion.body import Body
+from getup_jax.motion.calibrate import anatomical_frames
+from getup_jax.motion.skeleton import Recording, forward, rest_positions
+
+_TRUNK = ("spine_low", "spine_mid", "spine_upper", "neck")
+_BONES = {"head": "neck"} | {
+    f"{child}_{side}": f"{parent}_{side}"
+    for side in "lr"
+    for child, parent in (
+        ("shin", "thigh"),
+        ("foot", "shin"),
+        ("forearm", "arm"),
+        ("hand", "forearm"),
+    )
+}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Targets:
+    """Wanted link poses of every frame; links that the recording lacks have weight 0."""
+
+    fps: float
+    position: np.ndarray  # [F, L, 3] m
+    rotation: np.ndarray  # [F, L, 3, 3] link to world
+    names: dict[int, str]  # link index -> our name, for the links that have a target
+
+
+def make_targets(
+    recording: Recording, links: Mapping[str, int], body: Body, floor: float | None = None
+) -> Targets:
+    """Targets of every frame of a recording.
+
+    Bone directions and link orientations are the recording's; bone lengths are the
+    character's. The root moves as far as the legs' lengths say. `floor` is the height of the
+    recording's floor (m, in the recording); None: where its feet stand.
+    """
+    maker = _Maker(recording, links, body)
+    position, rotation = maker.positions(), maker.rotations
+    names = {body.links[link]: link for link in position}
+    count = len(body.character.link_names)
+    targets = Targets(
+        fps=recording.fps,
+        position=np.zeros((recording.num_frames, count, 3)),
+        rotation=np.tile(np.eye(3), (recording.num_frames, count, 1, 1)),
+        names=names,
+    )
+    for index, link in names.items():
+        targets.position[:, index] = position[link]
+        targets.rotation[:, index] = rotation[link]
+    level = _standing_level(targets, body) if floor is None else maker.scale * floor
+    targets.position[..., 2] -= level
+    return targets
+
+
+class _Maker:
+    """The steps from joint rotations to target positions."""
+
+    def __init__(self, recording: Recording, links: Mapping[str, int], body: Body) -> None:
+        self.body, self.links = body, links
+        self.position, turns = forward(recording)
+        self.rest = rest_positions(recording)
+        frames = anatomical_frames(recording, links)
+        self.rotations = {
+            link: turns[:, joint] @ frames[link] @ body.frames[link].T
+            for link, joint in links.items()
+            if link in body.links
+        }
+        self.scale = self._ratio(("thigh", "shin", "foot"))
+        self.chest = next(n for n in ("spine_upper", "spine_mid", "pelvis") if n in self.rotations)
+
+    def _ratio(self, limb: tuple[str, str, str]) -> float:
+        """The character's length of a limb over the recording's."""
+
+        def length(rest: np.ndarray, at: Mapping[str, int]) -> float:
+            points = [[rest[at[f"{name}_{side}"]] for name in limb] for side in "lr"]
+            return float(np.linalg.norm(np.diff(points, axis=1), axis=-1).sum())
+
+        return length(self.body.rest, self.body.links) / length(self.rest, self.links)
+
+    def positions(self) -> dict[str, np.ndarray]:
+        """{link: [F, 3]} for every link that both sides have."""
+        hips = 0.5 * (self._source("thigh_l") + self._source("thigh_r"))
+        centre = self.scale * hips
+        place = {"pelvis": centre - self._turn("pelvis", self._hips())}
+        for side in "lr":
+            place[f"thigh_{side}"] = self._rigid(place, f"thigh_{side}", "pelvis", "pelvis")
+        place |= self._trunk(centre, hips)
+        base = "neck" if "neck" in place else self.chest
+        for side in "lr":
+            shoulder, arm = f"shoulder_{side}", f"arm_{side}"
+            has_shoulder = bool(self._both((shoulder,)))
+            if has_shoulder:
+                place[shoulder] = self._rigid(place, shoulder, base, self.chest)
+            above = (shoulder, shoulder) if has_shoulder else (base, self.chest)
+            place[arm] = self._rigid(place, arm, *above)
+        for link in self._both(tuple(_BONES)):
+            parent = _BONES[link]
+            if parent in place:
+                way = self._source(link) - self._source(parent)
+                length = np.linalg.norm(way, axis=-1, keepdims=True)
+                place[link] = place[parent] + way / np.maximum(length, 1e-9) * self._length(link)
+        return place
+
+    def _both(self, links: tuple[str, ...]) -> list[str]:
+        return [link for link in links if link in self.links and link in self.body.links]
+
+    def _source(self, link: str) -> np.ndarray:
+        return self.position[:, self.links[link]]
+
+    def _ours(self, link: str) -> np.ndarray:
+        return self.body.rest[self.body.links[link]]
+
+    def _hips(self) -> np.ndarray:
+        return 0.5 * (self._ours("thigh_l") + self._ours("thigh_r")) - self._ours("pelvis")
+
+    def _length(self, link: str) -> float:
+        return float(np.linalg.norm(self._ours(link) - self._ours(_BONES[link])))
+
+    def _turn(self, link: str, vector: np.ndarray) -> np.ndarray:
+        """A vector of the zero pose, turned as the link is: [F, 3]."""
+        return self.rotations[link] @ vector
+
+    def _rigid(
+        self, place: Mapping[str, np.ndarray], link: str, parent: str, turned: str
+    ) -> np.ndarray:
+        return place[parent] + self._turn(turned, self._ours(link) - self._ours(parent))
+
+    def _trunk(self, centre: np.ndarray, hips: np.ndarray) -> dict[str, np.ndarray]:
+        """Links from the hips to the neck: on the recording's spine line, scaled as a whole.
+
+        Vertebrae are counted and spaced differently everywhere, so a link's target is the
+        point of that line at the link's own share of the trunk's length.
+        """
+        known = self._both(_TRUNK)
+        if not known:
+            return {}
+        line = np.stack([hips, *(self._source(link) for link in known)], axis=1)  # [F, k, 3]
+        source_at, rest_length = self._shares(self.rest, self.links, known)
+        own_at, own_length = self._shares(self.body.rest, self.body.links, known)
+        way = own_length / rest_length * (line - hips[:, None])
+        place = {}
+        for link, share in zip(known, own_at[1:], strict=True):
+            after = min(int(np.searchsorted(source_at, share)), len(known))
+            before = max(after - 1, 0)
+            part = (share - source_at[before]) / max(source_at[after] - source_at[before], 1e-9)
+            place[link] = centre + (1 - part) * way[:, before] + part * way[:, after]
+        return place
+
+    def _shares(
+        self, rest: np.ndarray, at: Mapping[str, int], known: list[str]
+    ) -> tuple[np.ndarray, float]:
+        """Where along the hips-to-neck line each link lies [1 + k], 0 to 1, and its length."""
+        hips = 0.5 * (rest[at["thigh_l"]] + rest[at["thigh_r"]])
+        points = np.stack([hips, *(rest[at[link]] for link in known)])
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        return along / along[-1], float(along[-1])
+
+
+def hull_heights(position: np.ndarray, rotation: np.ndarray, body: Body) -> np.ndarray:
+    """Lowest height [F, P] of every hull point, of link poses [F, L, ...]."""
+    hull = body.hull
+    turned = np.einsum("fpj,pj->fp", rotation[:, hull.link, 2], hull.point)
+    return position[:, hull.link, 2] + turned - hull.radius
+
+
+def _standing_level(targets: Targets, body: Body) -> float:
+    """Height of the soles while the character stands on its targets."""
+    feet = [index for index, name in targets.names.items() if name.startswith("foot")]
+    heights = hull_heights(targets.position, targets.rotation, body)
+    soles = heights[:, np.isin(body.hull.link, feet)].min(axis=1)
+    root = targets.position[:, body.links["pelvis"], 2] - soles
+    standing = soles[root > 0.85 * np.percentile(root, 98)]
+    return float(np.percentile(standing, 20))

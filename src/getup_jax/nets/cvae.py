@@ -1,0 +1,119 @@
+"""The conditional VAE of human poses [P 3.5] and its loss; Z is the latent's size.
+
+Encoder and decoder are tanh perceptrons that both see the condition c = (h, theta_x, theta_z), the
+features of the pose. Angles and condition enter in rad and m and are standardised inside, by the
+training set's statistics; the decoder's output is scaled back the same way. So the networks see
+hinges of all ranges alike, while the loss is the paper's, in rad^2.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from flax import linen as nn
+
+from getup_jax.nets.mlp import MLP
+
+CONDITION_SIZE = 3  # height (m), side and front angle (rad)
+
+# In rad and m. A hinge that hardly moves in the data must not be blown up to unit variance.
+MIN_STD = 0.02
+
+
+class CVAE(nn.Module):
+    """q(z | pose, c) = N(mean, exp(log_variance)) and the decoder (z, c) -> pose.
+
+    `conditional=False` is the standard VAE, for the ablation: the same calls, c is not seen.
+    """
+
+    num_joints: int  # J
+    latent_size: int  # Z
+    hidden_sizes: tuple[int, ...]
+    conditional: bool = True
+
+    def setup(self) -> None:
+        """Both perceptrons, and the statistics [J] and [3] that travel with the parameters."""
+        self.encoder = MLP(self.hidden_sizes, 2 * self.latent_size, "tanh")
+        self.decoder = MLP(self.hidden_sizes, self.num_joints, "tanh")
+        self.angle_mean = self.variable("statistics", "angle_mean", jnp.zeros, self.num_joints)
+        self.angle_std = self.variable("statistics", "angle_std", jnp.ones, self.num_joints)
+        self.condition_mean = self.variable(
+            "statistics", "condition_mean", jnp.zeros, CONDITION_SIZE
+        )
+        self.condition_std = self.variable("statistics", "condition_std", jnp.ones, CONDITION_SIZE)
+
+    def __call__(
+        self, angles: jax.Array, condition: jax.Array, noise: jax.Array
+    ) -> tuple[jax.Array, jax.Array, jax.Array]:
+        """Decoded angles [..., J], mean and log variance [..., Z], for normal noise [..., Z]."""
+        mean, log_variance = self.encode(angles, condition)
+        latent = mean + jnp.exp(0.5 * log_variance) * noise
+        return self.decode(latent, condition), mean, log_variance
+
+    def encode(self, angles: jax.Array, condition: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """Mean and log variance [..., Z] of angles [..., J] (rad), condition [..., 3]."""
+        standard = (angles - self.angle_mean.value) / self.angle_std.value
+        mean, log_variance = jnp.split(self.encoder(self._join(standard, condition)), 2, axis=-1)
+        return mean, log_variance
+
+    def decode(self, latent: jax.Array, condition: jax.Array) -> jax.Array:
+        """Angles [..., J] (rad) for latents [..., Z] and condition [..., 3]."""
+        standard = self.decoder(self._join(latent, condition))
+        return self.angle_mean.value + self.angle_std.value * standard
+
+    def _join(self, x: jax.Array, condition: jax.Array) -> jax.Array:
+        if not self.conditional:
+            return x
+        standard = (condition - self.condition_mean.value) / self.condition_std.value
+        return jnp.concatenate([x, standard], axis=-1)
+
+
+def init_variables(
+    model: CVAE, key: jax.Array, angles: jax.Array, condition: jax.Array
+) -> dict[str, Any]:
+    """Fresh parameters, with the statistics of training angles [N, J] and conditions [N, 3]."""
+    noise = jnp.zeros((1, model.latent_size))
+    variables = model.init(key, angles[:1], condition[:1], noise)
+    statistics = {
+        "angle_mean": jnp.mean(angles, axis=0),
+        "angle_std": jnp.maximum(jnp.std(angles, axis=0), MIN_STD),
+        "condition_mean": jnp.mean(condition, axis=0),
+        "condition_std": jnp.maximum(jnp.std(condition, axis=0), MIN_STD),
+    }
+    return {**variables, "statistics": statistics}
+
+
+def kl_to_standard_normal(mean: jax.Array, log_variance: jax.Array) -> jax.Array:
+    """KL(N(mean, exp(log_variance)) || N(0, 1)) summed over the last axis, [...] (nats).
+
+    1/2 sum(mean^2 + exp(log_variance) - log_variance - 1)
+    """
+    terms = jnp.square(mean) + jnp.exp(log_variance) - log_variance - 1.0
+    return 0.5 * jnp.sum(terms, axis=-1)
+
+
+def loss_terms(
+    model: CVAE,
+    variables: dict[str, Any],
+    batch: tuple[jax.Array, jax.Array],
+    noise: jax.Array,
+    beta: float,
+) -> dict[str, jax.Array]:
+    """The terms of the loss [] of a batch (angles [N, J], condition [N, 3]); it is their sum.
+
+    reconstruction: the squared error, averaged over batch and hinges (rad^2).
+    kl: beta times the divergence from N(0, 1), *summed* over batch and latent. This is the
+    reduction of the published ancestor (Yin et al. 2021), so beta goes with the batch size: per
+    pose, the KL weighs N * beta against the mean squared error.
+
+    noise [N, Z] is standard normal.
+    """
+    angles, condition = batch
+    output: Any = model.apply(variables, angles, condition, noise)
+    decoded, mean, log_variance = output
+    return {
+        "reconstruction": jnp.mean(jnp.square(decoded - angles)),
+        "kl": beta * jnp.sum(kl_to_standard_normal(mean, log_variance)),
+    }

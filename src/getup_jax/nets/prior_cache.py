@@ -1,0 +1,90 @@
+"""Trained priors on disk, found by a hash of what they were trained from."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from flax.traverse_util import flatten_dict, unflatten_dict
+
+from getup_jax.config import PriorConfig
+from getup_jax.nets.prior import PosePrior, from_dict, to_dict
+from getup_jax.nets.prior_data import PoseSet
+from getup_jax.nets.prior_training import PriorReport, train_prior
+
+# Raise it whenever the same poses and settings would give another prior, or the files change.
+FORMAT = 1
+
+Log = Callable[[str], None]
+
+
+def cached_prior(
+    poses: PoseSet, config: PriorConfig, folder: Path, log: Log = print
+) -> tuple[PosePrior, PriorReport]:
+    """The prior of these poses and settings: read from `folder`, else trained and written there.
+
+    A file that cannot be read is reported and made again. Raises OSError where `folder` cannot be
+    written.
+    """
+    path = folder / f"prior-{fingerprint(poses, config)}.npz"
+    if path.exists():
+        try:
+            return load_prior(path)
+        except (OSError, EOFError, ValueError, TypeError, KeyError, zipfile.BadZipFile) as error:
+            log(f"warning: {path}: damaged, trained again ({error})")
+    log(f"training the pose prior on {len(poses.angles)} poses")
+    prior, report = train_prior(poses, config, lambda *call: log(_progress_line(*call)))
+    save_prior(path, prior, report)
+    log(f"pose prior: {report.heldout_rmse_deg:.2f} degrees off on held-out poses, {path}")
+    return prior, report
+
+
+def fingerprint(poses: PoseSet, config: PriorConfig) -> str:
+    """16 hexadecimal digits of a hash of every array and setting."""
+    digest = hashlib.sha256(json.dumps([FORMAT, dataclasses.asdict(config)]).encode())
+    for field in dataclasses.fields(poses):
+        array = np.ascontiguousarray(getattr(poses, field.name))
+        digest.update(f"{field.name} {array.dtype} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()[:16]
+
+
+def save_prior(path: Path, prior: PosePrior, report: PriorReport) -> None:
+    """Write PATH.npz with the arrays and PATH.json with the report, each all or nothing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(dataclasses.asdict(report), indent=2) + "\n"
+    _replace(path.with_suffix(".json"), lambda file: file.write(text.encode()))
+    arrays: Any = flatten_dict(to_dict(prior), sep="/")
+    # The arrays last: they are what a reader looks for.
+    _replace(path, lambda file: np.savez(file, **arrays))
+
+
+def load_prior(path: Path) -> tuple[PosePrior, PriorReport]:
+    """What `save_prior` wrote. Raises many kinds of errors where a file is damaged or missing."""
+    with np.load(path) as arrays:
+        prior = from_dict(unflatten_dict(dict(arrays), sep="/"))
+    report = PriorReport(**json.loads(path.with_suffix(".json").read_text()))
+    return prior, report
+
+
+def _replace(path: Path, write: Callable[[Any], Any]) -> None:
+    """Write beside `path` and move into place, so that no reader sees half a file."""
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    try:
+        with partial.open("wb") as file:
+            write(file)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _progress_line(epoch: int, epochs: int, terms: dict[str, float]) -> str:
+    parts = ", ".join(f"{name} {value:.2e}" for name, value in terms.items())
+    return f"pose prior: epoch {epoch} of {epochs}, {parts}"

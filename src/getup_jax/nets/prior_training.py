@@ -1,0 +1,195 @@
+"""Training of the pose prior: every epoch is one jitted scan over shuffled minibatches."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from flax import struct
+
+from getup_jax.config import PriorConfig
+from getup_jax.nets import prior as pose_prior
+from getup_jax.nets.cvae import CVAE, init_variables, kl_to_standard_normal, loss_terms
+from getup_jax.nets.prior import MIN_LATENT_STD, PosePrior
+from getup_jax.nets.prior_data import PoseSet, split
+
+# epoch (from 1), epochs, mean of every loss term over the epoch
+Progress = Callable[[int, int, dict[str, float]], None]
+
+PROGRESS_CALLS = 20  # of one training
+NUM_RANDOM_LATENTS = 4096
+
+# rad. Poses at a limit are decoded with an error of this size, which says nothing about the prior.
+LIMIT_TOLERANCE = 0.05
+
+
+@dataclasses.dataclass(frozen=True)
+class PriorReport:
+    """What is known of a prior after training; errors are of the decoded latent mean."""
+
+    num_poses: int  # trained on
+    num_heldout: int
+    epochs: int
+    updates: int
+    seconds: float  # wall time of the training, compilation included
+    train_rmse_deg: float  # root mean square over poses and hinges
+    heldout_rmse_deg: float
+    mean_kl: float  # nats per held-out pose, summed over the latent
+    active_latents: int  # dimensions whose standard deviation is above the floor
+    pca_variance: float  # share of the training variance in the first latent_size components
+    random_angles_outside: float  # share of hinge angles past a limit, decoded random latents
+    random_poses_outside: float  # share of those poses with any hinge past a limit
+    random_worst_deg: float  # furthest past a limit
+
+
+@struct.dataclass
+class FitState:
+    """What one epoch hands to the next."""
+
+    params: Any
+    optimiser: Any  # optax state
+    key: jax.Array  # never changes: epochs fold their number into it
+
+
+def train_prior(
+    poses: PoseSet, config: PriorConfig, progress: Progress | None = None
+) -> tuple[PosePrior, PriorReport]:
+    """A prior trained on all of `poses` but the held-out groups, and how good it is.
+
+    Adam with a constant learning rate [P 3.5], for `epochs` or until `min_updates` updates,
+    whichever takes longer. A device computes the same prior from the same arguments.
+    """
+    start = time.perf_counter()
+    rows = split(poses.group, config.holdout, config.seed)
+    train, heldout = (_arrays(poses, part) for part in rows)
+    num_joints = poses.angles.shape[1]
+    model = CVAE(num_joints, config.latent_size, config.hidden_sizes, config.conditional)
+    variables, epochs, updates = _fit(model, train, config, progress)
+    mean, _ = model.apply(variables, *train, method="encode")
+    prior = PosePrior(
+        variables=variables,
+        latent_mean=jnp.mean(mean, axis=0),
+        latent_std=jnp.maximum(jnp.std(mean, axis=0), MIN_LATENT_STD),
+        joint_lower=jnp.asarray(poses.joint_lower),
+        joint_upper=jnp.asarray(poses.joint_upper),
+    )
+    random = decode_random(prior, poses.condition, NUM_RANDOM_LATENTS, config.seed)
+    report = PriorReport(
+        num_poses=len(train[0]),
+        num_heldout=len(heldout[0]),
+        epochs=epochs,
+        updates=updates,
+        seconds=time.perf_counter() - start,
+        train_rmse_deg=rmse_deg(prior, *train),
+        heldout_rmse_deg=rmse_deg(prior, *heldout),
+        mean_kl=float(jnp.mean(kl_to_standard_normal(*pose_prior.posterior(prior, *heldout)))),
+        active_latents=int(jnp.sum(prior.latent_std > MIN_LATENT_STD)),
+        pca_variance=pca_variance(np.asarray(train[0]), config.latent_size),
+        **limit_check(prior, random),
+    )
+    return prior, report
+
+
+def decode_random(prior: PosePrior, condition: np.ndarray, count: int, seed: int) -> jax.Array:
+    """Decoded latents z ~ N(latent_mean, latent_std) under drawn conditions, [count, J] rad."""
+    key_latent, key_condition = jax.random.split(jax.random.key(seed))
+    action = jax.random.normal(key_latent, (count, prior.latent_size))
+    rows = jax.random.randint(key_condition, (count,), 0, len(condition))
+    return pose_prior.decode_action(prior, action, jnp.asarray(condition)[rows])
+
+
+def limit_check(prior: PosePrior, angles: jax.Array) -> dict[str, float]:
+    """How far angles [N, J] (rad) leave the joint limits; see the fields of PriorReport."""
+    excess = jnp.maximum(prior.joint_lower - angles, angles - prior.joint_upper)
+    outside = excess > LIMIT_TOLERANCE
+    return {
+        "random_angles_outside": float(jnp.mean(outside)),
+        "random_poses_outside": float(jnp.mean(jnp.any(outside, axis=-1))),
+        "random_worst_deg": math.degrees(float(jnp.maximum(jnp.max(excess), 0.0))),
+    }
+
+
+def rmse_deg(prior: PosePrior, angles: jax.Array, condition: jax.Array) -> float:
+    """Root mean square error of the reconstruction over poses [N] and hinges [J], in degrees."""
+    decoded = pose_prior.decode(prior, pose_prior.encode(prior, angles, condition), condition)
+    return math.degrees(float(jnp.sqrt(jnp.mean(jnp.square(decoded - angles)))))
+
+
+def pca_variance(angles: np.ndarray, components: int) -> float:
+    """Share of the variance of angles [N, J] that the first principal components cover."""
+    eigenvalues = np.linalg.eigvalsh(np.cov(angles, rowvar=False))[::-1]
+    return float(eigenvalues[:components].sum() / eigenvalues.sum())
+
+
+def _arrays(poses: PoseSet, rows: np.ndarray) -> tuple[jax.Array, jax.Array]:
+    return jnp.asarray(poses.angles[rows]), jnp.asarray(poses.condition[rows])
+
+
+def _fit(
+    model: CVAE,
+    data: tuple[jax.Array, jax.Array],
+    config: PriorConfig,
+    progress: Progress | None,
+) -> tuple[dict[str, Any], int, int]:
+    """Trained variables, the number of epochs and of updates."""
+    key_init, key_epochs = jax.random.split(jax.random.key(config.seed))
+    variables = init_variables(model, key_init, *data)
+    optimiser = optax.adam(config.learning_rate)
+    params = variables["params"]
+    state = FitState(params=params, optimiser=optimiser.init(params), key=key_epochs)
+    run_epoch = _make_epoch(model, optimiser, config)
+    updates = max(1, len(data[0]) // config.batch_size)
+    epochs = max(config.epochs, math.ceil(config.min_updates / updates))
+    every = math.ceil(epochs / PROGRESS_CALLS)
+    for epoch in range(1, epochs + 1):
+        state, terms = run_epoch(state, variables["statistics"], data, epoch)
+        if progress is not None and (epoch % every == 0 or epoch == epochs):
+            progress(epoch, epochs, {name: float(value) for name, value in terms.items()})
+    return {**variables, "params": state.params}, epochs, epochs * updates
+
+
+def _make_epoch(
+    model: CVAE, optimiser: optax.GradientTransformation, config: PriorConfig
+) -> Callable[..., tuple[FitState, dict[str, jax.Array]]]:
+    """A jitted epoch: (state, statistics, data, number) -> (state, mean loss terms)."""
+
+    def loss(params: Any, statistics: Any, batch: Any, noise: jax.Array):
+        variables = {"params": params, "statistics": statistics}
+        terms = loss_terms(model, variables, batch, noise, config.beta)
+        return sum(terms.values()), terms
+
+    @jax.jit
+    def epoch(
+        state: FitState, statistics: Any, data: tuple[jax.Array, jax.Array], number: jax.Array
+    ) -> tuple[FitState, dict[str, jax.Array]]:
+        key_order, key_noise = jax.random.split(jax.random.fold_in(state.key, number))
+        order = _shuffled_batches(key_order, len(data[0]), config.batch_size)
+        batches = jax.tree.map(lambda x: x[order], data)
+        noise = jax.random.normal(key_noise, (*order.shape, model.latent_size))
+
+        def update(carry: tuple[Any, Any], inputs: tuple[Any, jax.Array]):
+            params, moments = carry
+            gradient, terms = jax.grad(loss, has_aux=True)(params, statistics, *inputs)
+            change, moments = optimiser.update(gradient, moments, params)
+            return (optax.apply_updates(params, change), moments), terms
+
+        carry = (state.params, state.optimiser)
+        (params, moments), terms = jax.lax.scan(update, carry, (batches, noise))
+        state = FitState(params=params, optimiser=moments, key=state.key)
+        return state, jax.tree.map(jnp.mean, terms)
+
+    return epoch
+
+
+def _shuffled_batches(key: jax.Array, count: int, size: int) -> jax.Array:
+    """Row indices [batches, min(size, count)]; rows past the last whole batch are left out."""
+    size = min(size, count)
+    order = jax.random.permutation(key, count)
+    return order[: count // size * size].reshape(-1, size)

@@ -1,0 +1,149 @@
+"""A character: its MJCF model, and every name in it resolved to an index once."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from getup_jax.config import ConfigError, PhysicsConfig
+from getup_jax.paths import asset_path
+
+_SOLVERS = {
+    "newton": mujoco.mjtSolver.mjSOL_NEWTON,
+    "cg": mujoco.mjtSolver.mjSOL_CG,
+    "pgs": mujoco.mjtSolver.mjSOL_PGS,
+}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CharacterSpec:
+    """A compiled model with the look-ups that tasks, motion and engines need.
+
+    Links are the bodies below the world in model order, the free root first. Joints are the
+    hinges in model order, which is also the order of the actuators.
+    """
+
+    model: mujoco.MjModel
+    link_names: tuple[str, ...]  # [L]
+    joint_names: tuple[str, ...]  # [J]
+    joint_lower: np.ndarray  # [J] rad
+    joint_upper: np.ndarray  # [J] rad
+    joint_link: np.ndarray  # [J] index of the link that the hinge moves
+    torque_limit: np.ndarray  # [J] Nm
+    neutral_qpos: np.ndarray  # [7 + J] standing, feet on z = 0
+    head_sphere: tuple[int, tuple[float, float, float], float]  # link, centre in it (m), radius (m)
+    mirror_joint: np.ndarray  # [J] hinge on the other side
+    mirror_sign: np.ndarray  # [J] sign of its angle in the mirror image
+
+    @property
+    def num_joints(self) -> int:
+        """J, the number of hinges."""
+        return len(self.joint_names)
+
+    def link(self, name: str) -> int:
+        """Index of a link; an unknown name lists the right ones."""
+        return _index(name, self.link_names, "link")
+
+    def links(self, names: Sequence[str]) -> np.ndarray:
+        """Indices of several links."""
+        return np.array([self.link(name) for name in names], np.int32)
+
+    def joint(self, name: str) -> int:
+        """Index of a hinge; an unknown name lists the right ones."""
+        return _index(name, self.joint_names, "joint")
+
+    def mirror(self, qpos: np.ndarray) -> np.ndarray:
+        """Mirror images of poses [..., 7 + J] in the plane y = 0; twice is the identity."""
+        qpos = np.asarray(qpos)
+        root = qpos[..., :7] * np.array([1, -1, 1, 1, -1, 1, -1])
+        joints = qpos[..., 7:][..., self.mirror_joint] * self.mirror_sign
+        return np.concatenate([root, joints], axis=-1)
+
+
+def load_character(config: PhysicsConfig) -> CharacterSpec:
+    """Read the MJCF file that the config names and apply the config's physics settings."""
+    model = _compile(config)
+    bodies = [model.body(i).name for i in range(1, model.nbody)]
+    hinges = [i for i in range(model.njnt) if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE]
+    names = tuple(model.joint(i).name for i in hinges)
+    _check_layout(model, hinges, config.character)
+    mirror_joint, mirror_sign = _mirror_table(names)
+    return CharacterSpec(
+        model=model,
+        link_names=tuple(bodies),
+        joint_names=names,
+        joint_lower=model.jnt_range[hinges, 0].copy(),
+        joint_upper=model.jnt_range[hinges, 1].copy(),
+        joint_link=model.jnt_bodyid[hinges] - 1,
+        torque_limit=model.actuator_forcerange[:, 1].copy(),
+        neutral_qpos=model.key("neutral").qpos.copy(),
+        head_sphere=_head_sphere(model),
+        mirror_joint=mirror_joint,
+        mirror_sign=mirror_sign,
+    )
+
+
+def character_file(name: str) -> Path:
+    """The MJCF file of a shipped character, or the path itself."""
+    path = Path(name) if name.endswith(".xml") else asset_path(f"{name}.xml")
+    if not path.is_file():
+        shipped = sorted(p.stem for p in asset_path().glob("*.xml"))
+        raise ConfigError(f"physics.character: no file {path}; shipped characters: {shipped}")
+    return path
+
+
+def _compile(config: PhysicsConfig) -> mujoco.MjModel:
+    spec = mujoco.MjSpec.from_file(str(character_file(config.character)))
+    spec.option.timestep = 1.0 / (config.control_hz * config.substeps)
+    spec.option.solver = _SOLVERS[config.solver]
+    spec.option.iterations = config.iterations
+    model = spec.compile()
+    model.dof_armature[6:] = config.armature
+    model.actuator_gainprm[:, 0] *= config.gain_scale
+    model.actuator_biasprm[:, 1:3] *= config.gain_scale
+    model.actuator_forcerange *= config.torque_scale
+    # the inverse weights that constraints use depend on the armature
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
+
+
+def _check_layout(model: mujoco.MjModel, hinges: list[int], name: str) -> None:
+    if model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE or len(hinges) != model.njnt - 1:
+        raise ConfigError(f"physics.character: {name}: expected one free root, then hinges only")
+    if model.actuator_trnid[:, 0].tolist() != hinges:
+        raise ConfigError(
+            f"physics.character: {name}: expected one actuator a hinge, in the hinges' order"
+        )
+    keys = [model.key(i).name for i in range(model.nkey)]
+    if "neutral" not in keys:
+        raise ConfigError(f"physics.character: {name}: no keyframe named 'neutral', has {keys}")
+
+
+def _head_sphere(model: mujoco.MjModel) -> tuple[int, tuple[float, float, float], float]:
+    geom = model.geom("head")
+    x, y, z = geom.pos.tolist()
+    return int(geom.bodyid[0]) - 1, (x, y, z), float(geom.size[0])
+
+
+def _mirror_table(names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Right axes are mirrored in the file, so only unpaired hinges flip their sign."""
+    other = {"_l_": "_r_", "_r_": "_l_"}
+    index, sign = [], []
+    for name in names:
+        side = next((s for s in other if s in name), None)
+        index.append(names.index(name.replace(side, other[side]) if side else name))
+        sign.append(-1.0 if side is None and name.endswith(("_abd", "_twist")) else 1.0)
+    return np.array(index, np.int32), np.array(sign)
+
+
+def _index(name: str, names: tuple[str, ...], kind: str) -> int:
+    if name in names:
+        return names.index(name)
+    close = difflib.get_close_matches(name, names, n=1)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
+    raise ConfigError(f"{kind} {name!r}: not in the character{hint} It has {', '.join(names)}")

@@ -1,0 +1,126 @@
+"""The MJX engine: the same character on a GPU or TPU, or on a CPU for parity tests.
+
+Between steps only positions, velocities and the solver's warm start are carried; everything
+else that MJX keeps is derived from them at the start of a step.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+from flax import struct
+from mujoco import mjx
+
+from getup_jax.config import ConfigError, PhysicsConfig
+from getup_jax.physics.character import CharacterSpec
+from getup_jax.types import Kinematics, PhysicsState
+
+
+@struct.dataclass
+class MjxState:
+    """What one simulation remembers."""
+
+    qpos: jax.Array  # [B, 7 + J]
+    qvel: jax.Array  # [B, 6 + J]
+    warmstart: jax.Array  # [B, 6 + J] last acceleration, the solver's first guess
+
+
+class MjxEngine:
+    """Steps batches of one character with MJX, in float32."""
+
+    def __init__(self, character: CharacterSpec, config: PhysicsConfig, impl: str):
+        self.name = "mjx" if impl == "jax" else f"mjx-{impl}"
+        self.control_dt = 1.0 / config.control_hz
+        self._substeps = config.substeps
+        if character.model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
+            character.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        self._model = _put_model(character.model, impl)
+        self._data = mjx.make_data(character.model, impl=impl)
+
+    def place(self, qpos: jax.Array, qvel: jax.Array) -> PhysicsState:
+        """See `Engine.place`."""
+        qpos, qvel = jnp.asarray(qpos, jnp.float32), jnp.asarray(qvel, jnp.float32)
+        state = MjxState(qpos=qpos, qvel=qvel, warmstart=jnp.zeros_like(qvel))
+        return _place(self, state)
+
+    def step(self, state: PhysicsState, ctrl: jax.Array) -> PhysicsState:
+        """See `Engine.step`."""
+        ctrl = jnp.nan_to_num(ctrl)
+        engine, kinematics = jax.vmap(self._step_one)(state.engine, ctrl)
+        return PhysicsState(engine=engine, kinematics=kinematics)
+
+    def _step_one(self, state: MjxState, ctrl: jax.Array) -> tuple[MjxState, Kinematics]:
+        data = self._load(state)
+
+        def substep(data: Any, _: None) -> tuple[Any, None]:
+            model, limited = self._limit_servos(data.replace(ctrl=ctrl))
+            return mjx.step(model, limited), None
+
+        data, _ = jax.lax.scan(substep, data, None, length=self._substeps)
+        after = MjxState(qpos=data.qpos, qvel=data.qvel, warmstart=data.qacc_warmstart)
+        return after, self._kinematics(data, data.actuator_force)
+
+    def _limit_servos(self, data: Any) -> tuple[Any, Any]:
+        """Turn the servos that reach their torque limit into constant torques.
+
+        MuJoCo leaves a limited servo out of the implicit integration, MJX does not. Written as
+        constant torques they have no derivative, and both engines do the same.
+        """
+        model = self._model
+        gain, bias = model.actuator_gainprm[:, 0], model.actuator_biasprm
+        force = gain * data.ctrl + bias[:, 1] * data.qpos[7:] + bias[:, 2] * data.qvel[6:]
+        lower, upper = model.actuator_forcerange.T
+        limited = (force < lower) | (force > upper)
+        ctrl = jnp.where(limited, jnp.clip(force, lower, upper) / gain, data.ctrl)
+        bias = jnp.where(limited[:, None], 0.0, bias)
+        return model.replace(actuator_biasprm=bias), data.replace(ctrl=ctrl)
+
+    def _place_one(self, state: MjxState) -> Kinematics:
+        return self._kinematics(self._load(state), jnp.zeros(self._model.nu))
+
+    def _load(self, state: MjxState) -> Any:
+        return self._data.replace(
+            qpos=state.qpos, qvel=state.qvel, qacc_warmstart=state.warmstart
+        )
+
+    def _kinematics(self, data: Any, torque: jax.Array) -> Kinematics:
+        """Link motion at the state's own positions; `step` leaves that of one substep ago."""
+        model = self._model
+        data = mjx.kinematics(model, data)
+        data = mjx.com_pos(model, data)
+        data = mjx.com_vel(model, data)
+        cvel, position = data.cvel[1:], data.xpos[1:]
+        angular = cvel[:, :3]
+        arm = position - data.subtree_com[1]
+        finite = jnp.isfinite(data.qpos).all() & jnp.isfinite(data.qvel).all()
+        return Kinematics(
+            qpos=data.qpos,
+            qvel=data.qvel,
+            link_position=position,
+            link_quaternion=data.xquat[1:],
+            link_angular_velocity=angular,
+            link_linear_velocity=cvel[:, 3:] + jnp.cross(angular, arm),
+            torque=torque,
+            finite=finite,
+        )
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _place(engine: MjxEngine, state: MjxState) -> PhysicsState:
+    kinematics = jax.vmap(engine._place_one)(state)
+    return PhysicsState(engine=state, kinematics=kinematics)
+
+
+def _put_model(model: mujoco.MjModel, impl: str) -> Any:
+    try:
+        return mjx.put_model(model, impl=impl)
+    except (ImportError, RuntimeError, AttributeError) as error:
+        raise ConfigError(
+            f"physics.engine: MJX cannot use impl {impl!r} here ({error}); for mjx-warp install "
+            "the extra: pip install 'getup-jax[warp]'"
+        ) from error
+

@@ -1,0 +1,96 @@
+"""What a training run tells its user: a live bar on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Column
+
+# The figures shown, by what a metric's name ends in: `rollout/reward` and `reward` alike.
+KEY_METRICS = {"reward": "reward", "return_rate": "return rate", "success": "success"}
+
+
+class Display:
+    """Messages and the progress of a run of `total` steps; quiet shows neither.
+
+    Use as a context manager; `start` begins the bar, so that messages come before it.
+    """
+
+    def __init__(self, total: int, quiet: bool = False, console: Console | None = None) -> None:
+        self._total = total
+        self._quiet = quiet
+        self._console = console or Console(highlight=False, soft_wrap=True)
+        self._bar: Progress | None = None
+
+    def log(self, message: str) -> None:
+        """One message, above the bar where there is one."""
+        if not self._quiet:
+            self._console.print(message, markup=False)
+
+    def start(self, steps: int) -> None:
+        """Begin the bar at `steps` steps done; no bar where the output is not a terminal."""
+        if self._quiet or not self._console.is_terminal:
+            return
+        column = Column(no_wrap=True, overflow="ellipsis")
+        text = TextColumn("{task.description}", markup=False, table_column=column)
+        self._bar = Progress(BarColumn(bar_width=20), text, console=self._console)
+        self._bar.add_task(describe(steps, self._total, math.nan, {}), total=self._total)
+        self._bar.start()
+
+    def update(self, steps: int, steps_per_s: float, metrics: Mapping[str, float]) -> None:
+        """Show how far the run is."""
+        text = describe(steps, self._total, steps_per_s, metrics)
+        if self._bar is None:
+            self.log(text)
+        else:
+            self._bar.update(self._bar.task_ids[0], completed=steps, description=text)
+
+    def __enter__(self) -> Display:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the bar; messages can still be logged."""
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
+
+def describe(steps: int, total: int, steps_per_s: float, metrics: Mapping[str, float]) -> str:
+    """One line: steps done, speed, time left and the key metrics."""
+    parts = [f"{count(steps)}/{count(total)} steps"]
+    if steps_per_s > 0:
+        left = max(total - steps, 0) / steps_per_s
+        parts += [f"{count(round(steps_per_s))}/s", f"{duration(left)} left"]
+    for name, label in KEY_METRICS.items():
+        value = find(metrics, name)
+        if value is not None and math.isfinite(value):
+            parts.append(f"{label} {value:.3f}")
+    return "  ".join(parts)
+
+
+def find(metrics: Mapping[str, float], name: str) -> float | None:
+    """The first metric of that name, with or without a group before it."""
+    return next((v for key, v in metrics.items() if key.rpartition("/")[2] == name), None)
+
+
+def count(number: int) -> str:
+    """A count in three figures: 850, 12.3 k, 4.56 M."""
+    for size, suffix in ((10**9, " G"), (10**6, " M"), (10**3, " k")):
+        if number >= size:
+            return f"{number / size:.3g}{suffix}"
+    return str(number)
+
+
+def duration(seconds: float) -> str:
+    """A time span as 2 h 05 min, 3 min 20 s or 40 s."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes:02d} min"
+    return f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"

@@ -1,0 +1,92 @@
+"""From a config to a task that is ready to train: motions, prior, start states."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from getup_jax.config import Config, ConfigError
+from getup_jax.motion.clips import GetUp
+from getup_jax.motion.library import load_motions
+from getup_jax.nets.prior import PosePrior
+from getup_jax.nets.prior_cache import cached_prior
+from getup_jax.nets.prior_data import make_pose_set
+from getup_jax.paths import cache_dir
+from getup_jax.physics.character import CharacterSpec, load_character
+from getup_jax.physics.engine import make_engine
+from getup_jax.physics.terrain import Terrain
+from getup_jax.tasks.getup import GetUpTask, World
+from getup_jax.tasks.observation import Observer
+from getup_jax.tasks.reset_pool import build_pool
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class BuiltTask:
+    """A task and what belongs to it."""
+
+    environment: GetUpTask
+    world: World
+    prior: PosePrior
+    getups: tuple[GetUp, ...]  # the styles, in the order of the world's axis G
+
+
+def build_task(
+    config: Config, log: Callable[[str], None], prior: PosePrior | None = None
+) -> BuiltTask:
+    """Load the motions, train the pose prior (or take the given one) and make the start states."""
+    character = load_character(config.physics)
+    log(f"motions: {', '.join(config.motion.source)}")
+    library = load_motions(config.motion, character)
+    getups = tuple(library.getups)
+    if not getups:
+        raise ConfigError(f"motion.source: no get-ups found in {config.motion.source}")
+    log(f"motions: {len(getups)} get-ups, {len(library.poses)} poses")
+    if prior is None:
+        poses = make_pose_set(library.poses, character, group=library.groups)
+        prior, _ = cached_prior(poses, config.prior, cache_dir() / "prior", log)
+    return assemble(config, character, getups, prior, log)
+
+
+def assemble(
+    config: Config,
+    character: CharacterSpec,
+    getups: Sequence[GetUp],
+    prior: PosePrior,
+    log: Callable[[str], None],
+) -> BuiltTask:
+    """The task from its finished parts."""
+    engine = make_engine(character, config.physics)
+    log(f"engine: {engine.name}")
+    action_size = prior.latent_size + character.num_joints
+    task = GetUpTask(
+        engine=engine,
+        character=character,
+        observer=Observer.of(character, len(config.task.lookahead_s), action_size),
+        config=config.task,
+        latent_size=prior.latent_size,
+    )
+    pool = build_pool(getups, character, engine, config.task, config.seed)
+    log(f"start states: {len(pool.time)}")
+    margin = config.task.target_margin_rad
+    world = World(
+        prior=prior,
+        pool=pool,
+        terrain=Terrain.flat(),
+        points=jnp.asarray(np.stack([g.points for g in getups]), jnp.float32),
+        duration=jnp.asarray([g.duration for g in getups], jnp.float32),
+        neutral_rotation=_neutral_rotation(character, task.observer),
+        target_lower=jnp.asarray(character.joint_lower - margin, jnp.float32),
+        target_upper=jnp.asarray(character.joint_upper + margin, jnp.float32),
+    )
+    return BuiltTask(environment=task, world=world, prior=prior, getups=tuple(getups))
+
+
+def _neutral_rotation(character: CharacterSpec, observer: Observer) -> jnp.ndarray:
+    data = mujoco.MjData(character.model)
+    data.qpos[:] = character.neutral_qpos
+    mujoco.mj_kinematics(character.model, data)
+    return observer.joint_rotation(jnp.asarray(data.xquat[1:], jnp.float32))

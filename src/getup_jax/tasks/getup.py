@@ -1,0 +1,247 @@
+"""The get-up task [P 3 to 5]: follow three style curves from the floor to standing."""
+
+from __future__ import annotations
+
+import dataclasses
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from getup_jax.config import TaskConfig
+from getup_jax.motion import curves
+from getup_jax.nets import prior as pose_prior
+from getup_jax.nets.prior import PosePrior
+from getup_jax.physics.character import CharacterSpec
+from getup_jax.physics.terrain import Terrain
+from getup_jax.rotation import angle, conjugate, multiply, rotate
+from getup_jax.tasks import rewards
+from getup_jax.tasks.episode import EpisodeState, Record, update_record, verdict
+from getup_jax.tasks.observation import Observer, Posture
+from getup_jax.tasks.reset_pool import Pool
+from getup_jax.types import Engine, StepOutput, select, take
+
+
+@struct.dataclass
+class World:
+    """Every array that the task reads and training does not change."""
+
+    prior: PosePrior
+    pool: Pool
+    terrain: Terrain
+    points: jax.Array  # [G, 9, 3] control points of the styles
+    duration: jax.Array  # [G] s
+    neutral_rotation: jax.Array  # [L - 1, 4] joint rotations of the neutral pose
+    target_lower: jax.Array  # [J] lowest PD target (rad)
+    target_upper: jax.Array  # [J]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GetUpTask:
+    """The `Environment` of the get-up task: `advance` is one step, `step` also resets."""
+
+    engine: Engine
+    character: CharacterSpec
+    observer: Observer
+    config: TaskConfig
+    latent_size: int
+
+    num_objectives = 1
+
+    @property
+    def observation_size(self) -> int:
+        """O."""
+        return self.observer.size
+
+    @property
+    def action_size(self) -> int:
+        """A: the latent pose and one offset a hinge."""
+        return self.latent_size + self.character.num_joints
+
+    def init(self, world: World, key: jax.Array, num_envs: int) -> EpisodeState:
+        """B fresh episodes."""
+        key_start, key_state = jax.random.split(key)
+        return self.start_random(world, key_start, num_envs).replace(key=key_state)
+
+    def step(
+        self, world: World, state: EpisodeState, action: jax.Array
+    ) -> tuple[EpisodeState, StepOutput]:
+        """One control step; episodes that end start anew."""
+        after, output = self.advance(world, state, action)
+        key_next, key_reset = jax.random.split(state.key)
+        done = output.terminated | output.truncated
+        fresh = self.start_random(world, key_reset, action.shape[0])
+        # the key has no simulation axis, so it stays out of the selection
+        after = select(done, fresh.replace(key=None), after.replace(key=None))
+        after = after.replace(key=key_next)
+        return after, output.replace(observation=after.observation)
+
+    def start_random(self, world: World, key: jax.Array, num_envs: int) -> EpisodeState:
+        """Episodes with a random style and kind of start."""
+        key_kind, key_style, key_row = jax.random.split(key, 3)
+        _, num_styles, rows = world.pool.table.shape
+        draw = jax.random.uniform(key_kind, (num_envs,))
+        stand, clip = self.config.stand_start, self.config.clip_start
+        kind = jnp.where(draw < stand, 1, jnp.where(draw < stand + clip, 2, 0)).astype(jnp.int32)
+        getup = jax.random.randint(key_style, (num_envs,), 0, num_styles)
+        row = jax.random.randint(key_row, (num_envs,), 0, rows)
+        return self.start(world, getup, kind, row)
+
+    def start(
+        self,
+        world: World,
+        getup: jax.Array,
+        kind: jax.Array,
+        row: jax.Array,
+        duration_scale: jax.Array | float = 1.0,
+    ) -> EpisodeState:
+        """Episodes of the given styles [B], kinds of start [B] and rows [B] of the pool."""
+        index = world.pool.table[kind, getup, row]
+        physics = take(world.pool.physics, index)
+        size = len(getup)
+        state = EpisodeState(
+            physics=physics,
+            observation=jnp.zeros((size, self.observation_size), jnp.float32),
+            action=jnp.zeros((size, self.action_size), jnp.float32),
+            getup=getup,
+            kind=kind,
+            time=world.pool.time[index] * duration_scale,
+            duration=world.duration[getup] * duration_scale,
+            low_steps=jnp.zeros(size, jnp.int32),
+            head_steps=jnp.zeros(size, jnp.int32),
+            record=Record.empty(size),
+            key=jnp.zeros(2, jnp.uint32),
+        )
+        # The filter keeps most of the last action, so the first target must be the start pose.
+        angles = physics.kinematics.qpos[:, 7:]
+        latent = pose_prior.encode_action(world.prior, angles, self.targets(world, state)[:, 0])
+        action = jnp.concatenate([latent, jnp.zeros_like(angles)], axis=-1)
+        state = state.replace(action=action)
+        return state.replace(observation=self._observe(world, state, self._posture(world, state)))
+
+    def advance(
+        self, world: World, state: EpisodeState, action: jax.Array
+    ) -> tuple[EpisodeState, StepOutput]:
+        """One control step without resets; `observation` is the final one."""
+        filtered = self.config.filter * action + (1.0 - self.config.filter) * state.action
+        physics = self.engine.step(state.physics, self.servo_target(world, state, filtered))
+        state = state.replace(
+            physics=physics, action=filtered, time=state.time + self.engine.control_dt
+        )
+        posture = self._posture(world, state)
+        target = self.targets(world, state)[:, 0]
+        terms = self._reward_terms(world, state, posture, target)
+        finite = physics.kinematics.finite
+        terms = {name: jnp.where(finite, value, 0.0) for name, value in terms.items()}
+        state, causes = self._early_ends(world, state, terms["task"], finite)
+        terminated = causes["low_reward"] | causes["head"] | causes["not_finite"]
+        half_step = 0.5 * self.engine.control_dt
+        end = state.duration + self.config.stand_time_s - half_step
+        truncated = ~terminated & (state.time > end)
+        state = self._record(world, state, posture, target, terms["task"])
+        observation = jnp.where(finite[:, None], self._observe(world, state, posture), 0.0)
+        state = state.replace(observation=observation)
+        metrics = {f"reward_{name}": value for name, value in terms.items()}
+        metrics |= {f"ended_{name}": value.astype(jnp.float32) for name, value in causes.items()}
+        output = StepOutput(
+            observation=observation,
+            final_observation=observation,
+            reward=terms["total"][:, None],
+            terminated=terminated,
+            truncated=truncated,
+            metrics=metrics,
+            episode=verdict(state, truncated, self._full_steps(state)),
+        )
+        return state, output
+
+    def servo_target(self, world: World, state: EpisodeState, filtered: jax.Array) -> jax.Array:
+        """Hinge targets [B, J]: q = decoder(z, c) + dq [P 3.4], c the curve values now."""
+        condition = self.targets(world, state)[:, 0]
+        latent, offset = jnp.split(filtered, [self.latent_size], axis=-1)
+        pose = pose_prior.decode_action(world.prior, latent, condition)
+        target = pose + self.config.offset_scale * offset
+        return jnp.clip(target, world.target_lower, world.target_upper)
+
+    def targets(self, world: World, state: EpisodeState) -> jax.Array:
+        """Curve values [B, n, 3] at the look-ahead times; the first one is now."""
+        ahead = jnp.asarray(self.config.lookahead_s, jnp.float32)
+        s = (state.time[:, None] + ahead) / state.duration[:, None]
+        points = world.points[state.getup]
+        return curves.evaluate(points[:, None], s)
+
+    def _posture(self, world: World, state: EpisodeState) -> Posture:
+        return self.observer.posture(state.physics.kinematics, world.terrain)
+
+    def _observe(self, world: World, state: EpisodeState, posture: Posture) -> jax.Array:
+        return self.observer.observe(posture, self.targets(world, state), state.action)
+
+    def _reward_terms(
+        self, world: World, state: EpisodeState, posture: Posture, target: jax.Array
+    ) -> dict[str, jax.Array]:
+        value = posture.features
+        alpha = rewards.phase(target[:, 0], world.points[state.getup, -1, 0])
+        joint_error = angle(multiply(conjugate(world.neutral_rotation), posture.joint_rotation))
+        omega = posture.link_angular_velocity.reshape(len(alpha), -1)
+        offset = self.config.offset_scale * state.action[:, self.latent_size :]
+        terms = {
+            "height": rewards.height(value[:, 0], target[:, 0]),
+            "orientation": rewards.orientation(value[:, 1:], target[:, 1:]),
+            "velocity": rewards.velocity(omega, alpha),
+            "posture": rewards.posture(joint_error, alpha),
+        }
+        terms["task"] = rewards.task(terms)
+        terms["natural"] = rewards.natural(offset, self.config.offset_limit_rad)
+        terms["total"] = terms["task"] * terms["natural"]
+        return terms
+
+    def _early_ends(
+        self, world: World, state: EpisodeState, task_reward: jax.Array, finite: jax.Array
+    ) -> tuple[EpisodeState, dict[str, jax.Array]]:
+        """[P 5.3]: a low task reward or the head on the floor, held for too long."""
+        low = task_reward < self.config.terminate_reward
+        head = self._head_gap(world, state) < self.config.head_clearance_m
+        state = state.replace(
+            low_steps=jnp.where(low, state.low_steps + 1, 0),
+            head_steps=jnp.where(head, state.head_steps + 1, 0),
+        )
+        most = self.config.terminate_after_s / self.engine.control_dt + 1e-3
+        causes = {
+            "low_reward": state.low_steps > most,
+            "head": state.head_steps > most,
+            "not_finite": ~finite,
+        }
+        return state, causes
+
+    def _head_gap(self, world: World, state: EpisodeState) -> jax.Array:
+        """Distance [B] from the head's lowest point to the ground (m)."""
+        link, offset, radius = self.character.head_sphere
+        kinematics = state.physics.kinematics
+        centre = kinematics.link_position[:, link] + rotate(
+            kinematics.link_quaternion[:, link], jnp.asarray(offset, jnp.float32)
+        )
+        return centre[:, 2] - radius - world.terrain.height(centre[:, :2])
+
+    def _record(
+        self,
+        world: World,
+        state: EpisodeState,
+        posture: Posture,
+        target: jax.Array,
+        task_reward: jax.Array,
+    ) -> EpisodeState:
+        time_left = state.duration + self.config.stand_time_s - state.time
+        record = update_record(
+            state.record,
+            posture.features,
+            target,
+            world.points[state.getup, -1, 0],
+            time_left,
+            state.time > state.duration,
+            task_reward,
+        )
+        return state.replace(record=record)
+
+    def _full_steps(self, state: EpisodeState) -> jax.Array:
+        """Steps [B] that an episode with this start has, if it does not end early."""
+        left = state.duration + self.config.stand_time_s - state.time
+        taken = state.record.stand_steps + state.record.rise_steps
+        return taken + jnp.round(left / self.engine.control_dt)

@@ -1,0 +1,85 @@
+"""One training run, from the settings to the last checkpoint."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import jax
+
+from getup_jax import checkpoint
+from getup_jax.algo.learner import make_learner
+from getup_jax.config import Config
+from getup_jax.loop import Job, Loop, TrainingError, num_iterations, steps_per_iteration
+from getup_jax.metrics import MetricsWriter, tensorboard_module
+from getup_jax.progress import Display, count, duration
+from getup_jax.runfolder import prepare, resume_command
+from getup_jax.stop import StopRequest
+
+__all__ = ["Job", "TrainingError", "build_job", "run"]
+
+Log = Callable[[str], None]
+
+
+def build_job(config: Config, log: Log) -> Job:
+    """The task and the learner that the settings ask for."""
+    from getup_jax.tasks.build import build_task
+
+    task = build_task(config, log)
+    learner = make_learner(
+        task.environment, config.network, config.ppo, total_steps=config.train.total_steps
+    )
+    return Job(learner=learner, world=task.world, prior=task.prior)
+
+
+def run(
+    config: Config,
+    run_folder: str | Path,
+    resume: bool = False,
+    quiet: bool = False,
+    build: Callable[[Config, Log], Job] = build_job,
+) -> int | None:
+    """Train until `train.total_steps`, or until Ctrl-C or SIGTERM.
+
+    Args:
+        config: the settings; written into the folder.
+        run_folder: gets config.yaml, metrics.jsonl and checkpoints/.
+        resume: go on from the folder's newest checkpoint, where it has one.
+        quiet: print nothing.
+        build: makes the task and the learner.
+
+    Returns:
+        None at the end of the run, else the number of the signal that stopped it.
+
+    Raises RunError, CheckpointError and TrainingError with texts for the user.
+    """
+    folder = Path(run_folder)
+    total = num_iterations(config) * steps_per_iteration(config)
+    with Display(total, quiet) as display, StopRequest(display.log) as stop:
+        prepare(folder, config, resume, display.log)
+        if _finished(folder, config):
+            display.log(f"{folder} has all of its {count(total)} steps; raise train.total_steps")
+            return None
+        if config.train.tensorboard:
+            tensorboard_module()  # fail now rather than after minutes of compiling
+        begin = time.monotonic()
+        display.log(f"building the task ({jax.devices()[0].platform}) ...")
+        loop = Loop(config, folder, build(config, display.log), display)
+        with MetricsWriter(folder, loop.done, config.train.tensorboard) as writer, stop.armed():
+            loop.train(writer, stop)
+        display.close()
+        display.log(_closing(folder, loop, config, time.monotonic() - begin))
+        return stop.signal if loop.done < num_iterations(config) else None
+
+
+def _finished(folder: Path, config: Config) -> bool:
+    steps = checkpoint.steps(folder / checkpoint.CHECKPOINTS)
+    return bool(steps) and int(steps[-1].name) >= num_iterations(config)
+
+
+def _closing(folder: Path, loop: Loop, config: Config, seconds: float) -> str:
+    if loop.done < num_iterations(config):
+        return f"saved {loop.saved}; continue with\n  {resume_command(folder)}"
+    done = f"{count(loop.steps)} steps done, {duration(seconds)} this time"
+    return f"{done}; evaluate them with\n  getup-eval --ckpt {folder}"

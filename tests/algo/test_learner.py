@@ -1,0 +1,239 @@
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from probes import Probe, make_world
+
+from getup_jax.algo.actor_critic import normalized
+from getup_jax.algo.learner import Learner, make_learner
+from getup_jax.algo.state import TrainState
+from getup_jax.config import NetworkConfig, PPOConfig
+
+NETWORK = NetworkConfig(hidden_sizes=(16,), activation="tanh")
+CONFIG = PPOConfig(
+    num_envs=16,
+    num_steps=8,
+    epochs=4,
+    minibatch_size=32,
+    discount=0.8,
+    learning_rate=(1e-2, 2e-3),
+    action_std=(0.4, 0.2),
+    stages=2,
+)
+TOTAL_STEPS = 80 * 16 * 8
+SIGNS = jnp.asarray([[0.0, 1.0], [0.0, -1.0]])
+
+
+class Run:
+    """A learner, its compiled iteration, and how often that was traced."""
+
+    def __init__(self, learner: Learner):
+        self.learner = learner
+        self.traces = 0
+        self.initial = jax.jit(learner.init)
+        self.iteration = jax.jit(self._counted, donate_argnums=1)
+
+    def _counted(self, world, state):
+        self.traces += 1
+        return self.learner.iteration(world, state)
+
+    def train(self, world, iterations: int = 80, seed: int = 0):
+        state = self.initial(world, jax.random.key(seed))
+        for _ in range(iterations):
+            state, metrics = self.iteration(world, state)
+        return state, metrics
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    return Run(make_learner(Probe(), NETWORK, CONFIG, TOTAL_STEPS))
+
+
+@pytest.fixture(scope="module")
+def popart_run() -> Run:
+    config = dataclasses.replace(CONFIG, popart=True, target_clip_fraction=0.1)
+    env = Probe(scale=(1.0, 1000.0))
+    return Run(make_learner(env, NETWORK, config, TOTAL_STEPS))
+
+
+def _values(run: Run, state: TrainState, observation=SIGNS) -> np.ndarray:
+    return np.asarray(run.learner.value(state.learner, jnp.asarray(observation)))[:, 0]
+
+
+def _actions(run: Run, state: TrainState) -> np.ndarray:
+    return np.asarray(run.learner.act(state.learner.policy, SIGNS))[:, 0]
+
+
+def _is_key(x: jax.Array) -> bool:
+    return jnp.issubdtype(x.dtype, jax.dtypes.prng_key)
+
+
+# ---- learning probes with known answers
+
+
+def test_value_of_a_constant_reward(run: Run):
+    state, metrics = run.train(make_world(constant=1.0))
+    assert_allclose(_values(run, state), 1.0, atol=0.05)
+    assert float(metrics["loss/value"]) < 1e-2
+
+
+def test_value_of_a_reward_that_is_observed(run: Run):
+    state, metrics = run.train(make_world(by_sign=1.0))
+    assert_allclose(_values(run, state), [1.0, -1.0], atol=0.1)
+    assert float(metrics["ppo/explained_variance"]) > 0.95
+
+
+def test_value_of_a_delayed_reward_is_discounted(run: Run):
+    state, _ = run.train(make_world(length=2, at_last=1.0, shows_step=1.0))
+    steps = [[0.0, 1.0], [0.0, -1.0], [1.0, 1.0], [1.0, -1.0]]
+    assert_allclose(_values(run, state, steps), [0.8, 0.8, 1.0, 1.0], atol=0.1)
+
+
+def test_policy_finds_the_rewarded_action(run: Run):
+    state, metrics = run.train(make_world(by_action=1.0, action_mean=0.5))
+    assert_allclose(_actions(run, state), 0.5, atol=0.1)
+    # All that is left to lose is the exploration's variance.
+    assert_allclose(metrics["rollout/reward"], -(0.2**2), atol=0.03)
+
+
+def test_policy_finds_the_action_for_what_it_sees(run: Run):
+    state, _ = run.train(make_world(by_action=1.0, action_mean=0.1, action_by_sign=0.5))
+    assert_allclose(_actions(run, state), [0.6, -0.4], atol=0.12)
+
+
+def test_truncation_bootstraps_and_termination_does_not(run: Run):
+    truncated, metrics = run.train(make_world(length=4, truncates=True, constant=1.0))
+    assert_allclose(_values(run, truncated), 1.0 / (1.0 - 0.8), rtol=0.05)
+    assert float(metrics["episode/terminated_share"]) == 0.0
+    terminated, metrics = run.train(make_world(length=4, constant=1.0))
+    best = 1.0 + 0.8 + 0.8**2 + 0.8**3
+    assert _values(run, terminated).max() < best
+    assert float(metrics["episode/terminated_share"]) == 1.0
+
+
+def test_popart_learns_values_of_any_scale(popart_run: Run):
+    world = make_world(by_sign=1.0, constant=2.0)
+    state, metrics = popart_run.train(world, iterations=60)
+    values = np.asarray(popart_run.learner.value(state.learner, SIGNS))
+    assert_allclose(values, [[3.0, 3000.0], [1.0, 1000.0]], rtol=0.1)
+    assert_allclose(state.learner.popart.mean, [2.0, 2000.0], rtol=0.05)
+    assert float(metrics["ppo/explained_variance"]) > 0.9
+
+
+# ---- the state and its step
+
+
+def test_one_compilation_for_the_run(run: Run, popart_run: Run):
+    for each in (run, popart_run):
+        before = each.traces
+        each.train(make_world(constant=1.0), iterations=3)
+        each.train(make_world(by_sign=0.5, length=3), iterations=2, seed=1)
+        assert each.traces == max(before, 1) == 1
+        assert each.iteration._cache_size() == 1
+
+
+def test_state_keeps_its_types(run: Run):
+    world = make_world(constant=1.0)
+    state = jax.eval_shape(run.learner.init, world, jax.random.key(0))
+    after, _ = jax.eval_shape(run.learner.iteration, world, state)
+    assert jax.tree.structure(after) == jax.tree.structure(state)
+    for old, new in zip(jax.tree.leaves(state), jax.tree.leaves(after), strict=True):
+        assert (old.shape, old.dtype) == (new.shape, new.dtype)
+        assert not old.weak_type
+        assert not new.weak_type
+
+
+def test_metrics_are_float32_scalars(run: Run):
+    _, metrics = run.train(make_world(constant=1.0, length=4), iterations=1)
+    assert all(x.shape == () and x.dtype == jnp.float32 for x in metrics.values())
+    ppo = ("clip_fraction", "kl", "explained_variance", "learning_rate", "action_std")
+    expected = {f"ppo/{name}" for name in (*ppo, "gradient_norm")}
+    expected |= {"loss/policy", "loss/value", "rollout/reward"}
+    expected |= {f"episode/{name}" for name in ("steps", "plus", "count", "terminated_share")}
+    assert set(metrics) == expected
+    assert float(metrics["episode/count"]) == 16 * 8 / 4
+    assert float(metrics["episode/steps"]) == 4.0
+
+
+def test_a_resumed_run_repeats_the_unbroken_one(run: Run):
+    world = make_world(by_action=1.0, action_mean=0.5, length=3)
+    unbroken, _ = run.train(world, iterations=5)
+    state, _ = run.train(world, iterations=2)
+    keys = jax.tree.map(_is_key, state)
+    saved = jax.tree.map(lambda x, k: np.asarray(jax.random.key_data(x) if k else x), state, keys)
+    state = jax.tree.map(
+        lambda x, k: jax.random.wrap_key_data(x) if k else jnp.asarray(x), saved, keys
+    )
+    for _ in range(3):
+        state, _ = run.iteration(world, state)
+    assert int(state.iteration) == 5
+    for one, other in zip(jax.tree.leaves(unbroken), jax.tree.leaves(state), strict=True):
+        assert bool((one == other).all())
+
+
+def test_the_iteration_number_seeds_its_noise(run: Run):
+    world = make_world(by_action=1.0)
+    actors = []
+    for iteration in (0, 0, 1):
+        state = run.initial(world, jax.random.key(0))
+        state = dataclasses.replace(state, iteration=jnp.int32(iteration))
+        state, _ = run.iteration(world, state)
+        actors.append(np.asarray(state.learner.policy.actor["params"]["output"]["kernel"]))
+    assert_array_equal(actors[0], actors[1])
+    assert np.abs(actors[0] - actors[2]).max() > 1e-4
+
+
+def test_statistics_take_in_every_observation_once(run: Run):
+    # The step's number takes 0, 1, 2, 3 equally often.
+    world = make_world(length=4, shows_step=1.0)
+    state, _ = run.train(world, iterations=3)
+    statistics = state.learner.policy.statistics
+    assert float(statistics.count) == 3 * 16 * 8
+    assert_allclose(statistics.mean[0], 1.5, rtol=1e-6)
+    assert_allclose(statistics.variance[0], 1.25, rtol=1e-5)
+    found = normalized(state.learner.policy, jnp.asarray([[1.5, 0.0]]))
+    assert_allclose(found[0, 0], 0.0, atol=1e-5)
+
+
+def test_stages_of_rate_and_noise(run: Run):
+    state = run.initial(make_world(), jax.random.key(0))
+    scale = jnp.asarray(0.5, jnp.float32)
+    state = dataclasses.replace(
+        state, learner=dataclasses.replace(state.learner, learning_rate_scale=scale)
+    )
+    for iteration, rate, std in ((0, 1e-2, 0.4), (39, 1e-2, 0.4), (40, 2e-3, 0.2), (99, 2e-3, 0.2)):
+        stage = run.learner.stage(dataclasses.replace(state, iteration=jnp.int32(iteration)))
+        assert_allclose(stage.learning_rate, 0.5 * rate, rtol=1e-6)
+        assert_allclose(stage.action_std, [std], rtol=1e-6)
+
+
+def test_rate_adapts_only_when_asked(run: Run, popart_run: Run):
+    world = make_world(by_action=1.0)
+    fixed, _ = run.train(world, iterations=2)
+    assert float(fixed.learner.learning_rate_scale) == 1.0
+    adapted, metrics = popart_run.train(world, iterations=1)
+    fraction, scale = metrics["ppo/clip_fraction"], adapted.learner.learning_rate_scale
+    outside = fraction > 0.125 or fraction < 0.08
+    assert (float(scale) != 1.0) == bool(outside)
+
+
+def test_switched_off_parts_are_none():
+    config = dataclasses.replace(CONFIG, normalize_observation=False)
+    learner = make_learner(Probe(), NETWORK, config, TOTAL_STEPS)
+    state = jax.eval_shape(learner.init_learner, jax.random.key(0))
+    assert state.policy.statistics is None
+    assert state.popart is None
+    assert_array_equal(normalized(state.policy, SIGNS), SIGNS)
+
+
+def test_weights_are_scaled_and_checked():
+    env = Probe(scale=(1.0, 1.0))
+    assert make_learner(env, NETWORK, CONFIG, 1).weights == (0.5, 0.5)
+    assert make_learner(env, NETWORK, CONFIG, 1, (1.0, 3.0)).weights == (0.25, 0.75)
+    with pytest.raises(ValueError, match="expected 2"):
+        make_learner(env, NETWORK, CONFIG, 1, (1.0,))

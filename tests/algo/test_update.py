@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from getup_jax.algo.update import (
+    ADAM_EPSILON,
+    adapt_scale,
+    make_optimiser,
+    run_minibatches,
+    shuffled_minibatches,
+)
+
+
+def test_every_epoch_is_a_fresh_permutation():
+    rows = np.asarray(shuffled_minibatches(jax.random.key(0), 3, 24, 8))
+    assert rows.shape == (9, 8)
+    epochs = rows.reshape(3, 24)
+    np.testing.assert_array_equal(np.sort(epochs, axis=1), np.tile(np.arange(24), (3, 1)))
+    assert (epochs[0] != epochs[1]).any()
+    assert (epochs[1] != epochs[2]).any()
+
+
+def _loss(parameter, minibatch):
+    error = jnp.mean(jnp.square(parameter - minibatch))
+    return error, {"error": error}
+
+
+def _slow_adam(parameter, x, rows, rate, max_norm):
+    """Kingma and Ba 2015, algorithm 1, on the clipped gradient of the mean squared error."""
+    m = v = 0.0
+    errors, norms = [], []
+    for step, row in enumerate(rows, start=1):
+        errors.append(np.mean(np.square(parameter - x[row])))
+        gradient = 2.0 * np.mean(parameter - x[row])
+        norms.append(abs(gradient))
+        gradient *= min(1.0, max_norm / abs(gradient))
+        m = 0.9 * m + 0.1 * gradient
+        v = 0.999 * v + 0.001 * gradient**2
+        root = np.sqrt(v / (1 - 0.999**step))
+        parameter -= rate * (m / (1 - 0.9**step)) / (root + ADAM_EPSILON)
+    return parameter, np.mean(errors), np.mean(norms)
+
+
+@pytest.mark.parametrize("max_norm", [0.5, 100.0])
+def test_updates_match_slow_adam(max_norm: float):
+    x = np.random.default_rng(0).normal(size=40).astype(np.float32) + 3.0
+    rows = np.asarray(shuffled_minibatches(jax.random.key(0), 2, 40, 10))
+    optimiser = make_optimiser(max_norm, jnp.asarray(0.1))
+    start = jnp.zeros(())
+    parameter, state, metrics = run_minibatches(
+        _loss, optimiser, start, optimiser.init(start), jnp.asarray(x), jnp.asarray(rows)
+    )
+    expected, error, norm = _slow_adam(0.0, x, rows, 0.1, max_norm)
+    assert_allclose(parameter, expected, rtol=1e-4)
+    assert_allclose(metrics["error"], error, rtol=1e-4)
+    assert_allclose(metrics["ppo/gradient_norm"], norm, rtol=1e-4)
+    assert jax.tree.structure(state) == jax.tree.structure(make_optimiser(1.0, 0.0).init(start))
+
+
+def test_scale_follows_the_clip_fraction():
+    one = jnp.ones(())
+    assert_allclose(adapt_scale(one, jnp.asarray(0.30), 0.15), 1 / 1.2, rtol=1e-6)
+    assert_allclose(adapt_scale(one, jnp.asarray(0.05), 0.15), 1.2, rtol=1e-6)
+    assert_allclose(adapt_scale(one, jnp.asarray(0.15), 0.15), 1.0)
+    assert_allclose(adapt_scale(one, jnp.asarray(0.30), None), 1.0)
+
+
+def test_scale_is_bounded():
+    scale = jnp.ones(())
+    for _ in range(40):
+        scale = adapt_scale(scale, jnp.asarray(0.9), 0.15)
+    assert_allclose(scale, 0.05)
+    for _ in range(80):
+        scale = adapt_scale(scale, jnp.asarray(0.0), 0.15)
+    assert_allclose(scale, 5.0)

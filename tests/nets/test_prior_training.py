@@ -1,0 +1,220 @@
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from pose_samples import QUICK, character, manifold_poses, pose_set, quick_prior
+
+from getup_jax.nets import prior as pose_prior
+from getup_jax.nets import prior_cache, prior_report
+from getup_jax.nets.prior_data import BLOCK, PoseSet, blocks, make_pose_set, pose_conditions, split
+from getup_jax.nets.prior_training import limit_check, pca_variance, train_prior
+
+BRIEF = dataclasses.replace(QUICK, min_updates=30)
+
+
+def small_set(rows: int = 300) -> PoseSet:
+    return make_pose_set(manifold_poses(rows), character())
+
+
+# --- poses and what is held out
+
+
+def test_features_of_standing_supine_and_prone():
+    spec = character()
+    poses = np.tile(spec.neutral_qpos, (3, 1))
+    half = np.sqrt(0.5)
+    poses[1, 2:7] = 0.1, half, 0, -half, 0  # tipped over backwards
+    poses[2, 2:7] = 0.1, half, 0, half, 0
+    condition = pose_conditions(poses, spec)
+    np.testing.assert_allclose(condition[:, 1], np.pi / 2, atol=1e-4)
+    np.testing.assert_allclose(condition[:, 2], [np.pi / 2, 0, np.pi], atol=0.1)
+    assert 1.2 < condition[0, 0] < 1.6
+    np.testing.assert_allclose(condition[1:, 0], 0.1, atol=0.05)
+
+
+def test_mirror_images_have_the_mirrored_features_and_the_same_group():
+    poses = manifold_poses(60)
+    poses[:, 3:7] = np.array([0.9, 0.3, 0.3, 0.1])
+    both = make_pose_set(poses, character(), mirror=True)
+    np.testing.assert_array_equal(both.group[:60], both.group[60:])
+    expected = both.condition[:60] * [1, -1, 1] + [0, np.pi, 0]
+    np.testing.assert_allclose(both.condition[60:], expected, atol=1e-4)
+
+
+def test_blocks_are_contiguous_and_short_sets_are_cut_finer():
+    assert list(blocks(95)[[0, BLOCK - 1, BLOCK, 94]]) == [0, 0, 1, 3] or BLOCK != 30
+    assert len(np.unique(blocks(3000))) == 3000 // BLOCK
+    assert len(np.unique(blocks(20))) >= 10
+
+
+def test_split_divides_all_rows_and_keeps_groups_whole():
+    group = np.tile(blocks(3000), 2)
+    train, heldout = split(group, 0.1, seed=3)
+    np.testing.assert_array_equal(np.sort(np.concatenate([train, heldout])), np.arange(6000))
+    assert not set(group[train]) & set(group[heldout])
+    assert len(heldout) == 600
+    assert not np.array_equal(heldout, split(group, 0.1, seed=4)[1])
+
+
+def test_split_leaves_something_on_both_sides():
+    for holdout in (0.001, 0.999):
+        train, heldout = split(np.array([0, 0, 1]), holdout, seed=0)
+        assert len(train)
+        assert len(heldout)
+
+
+def test_bad_poses_are_named():
+    poses = manifold_poses(40)
+    poses[17, 9] = np.nan
+    with pytest.raises(ValueError, match="row 17"):
+        make_pose_set(poses, character())
+    good = small_set(40)
+    with pytest.raises(ValueError, match=r"condition: expected shape \(40, 3\), got \(39, 3\)"):
+        dataclasses.replace(good, condition=good.condition[1:])
+
+
+# --- training
+
+
+def test_a_two_dimensional_manifold_is_learned():
+    _, report = quick_prior()
+    assert report.heldout_rmse_deg < 3.0
+    assert report.train_rmse_deg <= report.heldout_rmse_deg
+    spread = np.degrees(np.sqrt(np.mean(pose_set().angles.var(axis=0))))
+    assert spread > 20  # degrees: what predicting the mean pose would be off
+
+
+def test_the_standard_vae_is_trained_too():
+    config = dataclasses.replace(QUICK, conditional=False, min_updates=1000)
+    prior, report = train_prior(pose_set(), config)
+    assert report.heldout_rmse_deg < 6.0
+    latent = jnp.ones((4, config.latent_size))
+    condition = jnp.asarray(pose_set().condition[:4])
+    np.testing.assert_array_equal(
+        pose_prior.decode(prior, latent, condition), pose_prior.decode(prior, latent, condition + 1)
+    )
+
+
+def test_small_sets_get_more_epochs_and_progress_ends_with_the_last():
+    calls = []
+    _, report = train_prior(small_set(), BRIEF, lambda *call: calls.append(call))
+    assert report.num_poses + report.num_heldout == 300
+    per_epoch = report.num_poses // BRIEF.batch_size
+    assert report.epochs == -(-BRIEF.min_updates // per_epoch)
+    assert report.updates == report.epochs * per_epoch
+    assert calls[-1][:2] == (report.epochs, report.epochs)
+    assert set(calls[-1][2]) == {"reconstruction", "kl"}
+
+
+def test_fewer_poses_than_a_batch():
+    _, report = train_prior(small_set(40), dataclasses.replace(BRIEF, epochs=3, min_updates=1))
+    assert report.updates == 3
+    assert np.isfinite(report.heldout_rmse_deg)
+
+
+def test_the_same_arguments_give_the_same_prior():
+    one, two = (train_prior(small_set(), BRIEF)[0] for _ in range(2))
+    np.testing.assert_array_equal(one.latent_mean, two.latent_mean)
+
+
+def test_pca_variance_of_a_plane_and_of_a_ball():
+    rng = np.random.default_rng(0)
+    plane = rng.normal(size=(500, 2)) @ rng.normal(size=(2, 10))
+    assert pca_variance(plane, 2) == pytest.approx(1.0)
+    assert pca_variance(rng.normal(size=(20000, 10)), 5) == pytest.approx(0.5, abs=0.02)
+
+
+def test_limit_check_counts_angles_and_poses():
+    prior, _ = quick_prior()
+    angles = jnp.tile(0.5 * (prior.joint_lower + prior.joint_upper), (4, 1))
+    angles = angles.at[0, :2].set(prior.joint_upper[:2] + 0.2)
+    checked = limit_check(prior, angles)
+    assert checked["random_poses_outside"] == 0.25
+    assert checked["random_angles_outside"] == pytest.approx(2 / angles.size)
+    assert checked["random_worst_deg"] == pytest.approx(np.degrees(0.2), rel=1e-4)
+
+
+# --- cache
+
+
+def test_a_cached_prior_is_read_and_not_trained_again(tmp_path, monkeypatch):
+    prior, report = prior_cache.cached_prior(small_set(), BRIEF, tmp_path, lambda _: None)
+    monkeypatch.setattr(prior_cache, "train_prior", None)
+    again, same = prior_cache.cached_prior(small_set(), BRIEF, tmp_path)
+    assert same == report
+    one, two = pose_prior.to_dict(prior), pose_prior.to_dict(again)
+    np.testing.assert_array_equal(one["latent_std"], two["latent_std"])
+    kernels = [d["variables"]["params"]["decoder"]["hidden_0"]["kernel"] for d in (one, two)]
+    np.testing.assert_array_equal(*kernels)
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".json", ".npz"]
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".json"])
+@pytest.mark.parametrize("damage", ["cut", "empty", "gone"])
+def test_a_damaged_cache_is_made_again(tmp_path, suffix, damage):
+    config = dataclasses.replace(BRIEF, min_updates=1)
+    prior, _ = prior_cache.cached_prior(small_set(60), config, tmp_path, lambda _: None)
+    (file,) = tmp_path.glob(f"*{suffix}")
+    whole = file.read_bytes()
+    if damage == "gone":
+        file.unlink()
+    else:
+        file.write_bytes(whole[: len(whole) // 2] if damage == "cut" else b"")
+    lines = []
+    again, _ = prior_cache.cached_prior(small_set(60), config, tmp_path, lines.append)
+    np.testing.assert_array_equal(prior.latent_mean, again.latent_mean)
+    if (suffix, damage) != (".npz", "gone"):
+        assert "damaged" in lines[0]
+    lines.clear()
+    prior_cache.cached_prior(small_set(60), config, tmp_path, lines.append)
+    assert lines == []
+
+
+def test_other_poses_or_settings_are_another_prior():
+    poses = small_set(60)
+    prints = {
+        prior_cache.fingerprint(poses, BRIEF),
+        prior_cache.fingerprint(poses, dataclasses.replace(BRIEF, seed=1)),
+        prior_cache.fingerprint(dataclasses.replace(poses, angles=poses.angles + 1e-3), BRIEF),
+        prior_cache.fingerprint(dataclasses.replace(poses, group=poses.group[::-1]), BRIEF),
+    }
+    assert len(prints) == 4
+    assert prior_cache.fingerprint(small_set(60), BRIEF) in prints
+
+
+# --- what the prior does to bodies
+
+
+def test_self_penetration_of_a_clear_pose_and_of_a_hand_in_the_trunk():
+    spec = character()
+    clear = prior_report.self_penetration(spec.neutral_qpos[None, 7:], spec)
+    assert clear.share_deep == 0
+    folded = np.tile(spec.neutral_qpos[7:], (2, 1))
+    folded[1, spec.joint("forearm_l_flex")] = -1.57
+    folded[1, spec.joint("arm_l_twist")] = -1.57
+    depth = prior_report.self_penetration(folded, spec)
+    assert depth.share_deep == 0.5
+    assert 0.02 < depth.worst_m < 0.3
+
+
+def test_features_of_the_same_joints_have_no_error():
+    poses = manifold_poses(20)
+    condition = pose_conditions(poses, character())
+    angles = jnp.asarray(poses[:, 7:])
+    error = prior_report.feature_error(poses, angles, condition, character())
+    assert max(dataclasses.astuple(error)) < 1e-4
+    bent = angles.at[:, character().joint("spine_low_flex")].add(0.3)
+    error = prior_report.feature_error(poses, bent, condition, character())
+    assert 0.1 < error.front_angle_rad < 0.3
+
+
+def test_an_evaluation_of_the_quick_prior():
+    prior, _ = quick_prior()
+    result = prior_report.evaluate_prior(prior, manifold_poses(50), character())
+    assert result.num_poses == 50
+    assert result.rmse_deg < 3.0
+    assert result.feature_error.height_m < 0.05
+    assert result.decoded_penetration.share_deep == pytest.approx(
+        result.data_penetration.share_deep, abs=0.2
+    )

@@ -1,0 +1,426 @@
+from __future__ import annotations
+
+import dataclasses
+import errno
+import json
+import resource
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from flax import serialization, struct
+
+from getup_jax import checkpoint, manifest, settings, storage
+from getup_jax.checkpoint import export_policy, load_policy, restore_learner, save_learner
+from getup_jax.config import Config
+from getup_jax.paths import asset_path
+from getup_jax.storage import CheckpointError, from_nested, to_nested
+
+
+@struct.dataclass
+class Policy:
+    actor: Any
+    statistics: Any = None
+
+
+class Moments(NamedTuple):
+    mean: jax.Array
+    count: jax.Array
+
+
+@struct.dataclass
+class State:
+    policy: Policy
+    optimiser: Any
+    rows: jax.Array
+    key: jax.Array
+    typed_key: jax.Array
+    iteration: jax.Array
+    flags: jax.Array
+    empty: jax.Array
+    nothing: Any = None
+
+
+def make_policy(seed: int, width: int = 8) -> Policy:
+    kernel = jax.random.normal(jax.random.PRNGKey(seed), (5, width))
+    statistics = Moments(jnp.arange(5.0) + seed, jnp.float32(seed))
+    return Policy({"params": {"Dense_0": {"kernel": kernel}}}, statistics)
+
+
+def make_state(seed: int, width: int = 8) -> State:
+    policy = make_policy(seed, width)
+    bits = jax.random.bits(jax.random.PRNGKey(seed), (3, 7), jnp.uint32)
+    return State(
+        policy=policy,
+        optimiser=[(Moments(policy.actor, jnp.int32(seed)), ()), None],
+        rows=bits.at[0, :2].set(jnp.array([0x7FC00001, 0xFFFFFFFF], jnp.uint32)),
+        key=jax.random.PRNGKey(seed),
+        typed_key=jax.random.key(seed),
+        iteration=jnp.int32(seed),
+        flags=jnp.array([True, False]),
+        empty=jnp.zeros((0, 3), jnp.int8),
+    )
+
+
+def save(folder: Path, iteration: int, keep: int = 2, width: int = 8) -> Path:
+    config = settings.load_config(None, [f"train.keep={keep}", "seed=5"])
+    item = {"policy": make_policy(iteration, width), "prior": {"decoder": jnp.ones((2, 2))}}
+    state = make_state(iteration, width)
+    return save_learner(folder, iteration, state, config, item, {"steps": iteration * 10})
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def assert_same(a: Any, b: Any) -> None:
+    """Structure, types, dtypes and bits."""
+    assert jax.tree.structure(a) == jax.tree.structure(b)
+    for x, y in zip(jax.tree.leaves(a), jax.tree.leaves(b), strict=True):
+        assert isinstance(x, jax.Array) == isinstance(y, jax.Array)
+        assert x.dtype == y.dtype
+        if jnp.issubdtype(x.dtype, jax.dtypes.prng_key):
+            x, y = jax.random.key_data(x), jax.random.key_data(y)
+        assert np.asarray(x).tobytes() == np.asarray(y).tobytes()
+        assert x.shape == y.shape
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory) -> Path:
+    """A run folder with the checkpoints 3 and 4; tests copy it before they change it."""
+    run = tmp_path_factory.mktemp("run")
+    save(run / "checkpoints", 3)
+    save(run / "checkpoints", 4)
+    return run
+
+
+@pytest.fixture
+def run(saved, tmp_path) -> Path:
+    return Path(shutil.copytree(saved, tmp_path / "run"))
+
+
+def test_restore_is_bit_equal(saved):
+    restored = restore_learner(saved / "checkpoints", make_state(0))
+    assert_same(restored.state, make_state(4))
+    assert restored.metadata == {"iteration": 4, "steps": 40}
+    assert restored.path == saved / "checkpoints" / "00000004"
+
+
+def test_nested_dicts_are_those_of_flax():
+    policy = make_policy(1)
+    expected = serialization.to_state_dict(policy)
+    assert jax.tree.structure(to_nested(policy)) == jax.tree.structure(expected)
+    assert_same(serialization.from_state_dict(make_policy(2), expected), policy)
+
+
+@pytest.mark.parametrize(
+    "leaf",
+    [np.float32([np.nan, -0.0]), np.zeros((2, 0)), np.float16(2), True, 7, 2.5],
+    ids=str,
+)
+def test_host_leaves_stay_what_they_are(tmp_path, leaf):
+    storage.write_item(tmp_path / "item", to_nested({"x": leaf}))
+    (back,) = from_nested({"x": leaf}, storage.read_item(tmp_path / "item"), "item").values()
+    assert isinstance(back, type(leaf)) or isinstance(leaf, np.generic)
+    assert np.asarray(back).tobytes() == np.asarray(leaf).tobytes()
+    assert np.shape(back) == np.shape(leaf)
+
+
+def test_bfloat16_and_shape_only_templates(tmp_path):
+    tree = {"x": jnp.ones(3, jnp.bfloat16)}
+    storage.write_item(tmp_path / "item", to_nested(tree))
+    template = jax.eval_shape(lambda: tree)
+    assert_same(from_nested(template, storage.read_item(tmp_path / "item"), "item"), tree)
+
+
+@pytest.mark.parametrize("path", ["", "checkpoints", "checkpoints/00000004"])
+def test_load_policy_takes_every_kind_of_folder(saved, path):
+    loaded = load_policy(saved / path)
+    assert_same(from_nested(make_policy(0), loaded.policy, "policy"), make_policy(4))
+    assert loaded.prior["decoder"].tolist() == [[1, 1], [1, 1]]
+    assert loaded.config.seed == 5
+    assert loaded.metadata["steps"] == 40
+
+
+def test_load_policy_needs_no_learner(run):
+    shutil.rmtree(run / "checkpoints" / "00000004" / "learner")
+    assert load_policy(run).metadata["iteration"] == 4
+
+
+def test_relative_paths_work(run, monkeypatch):
+    monkeypatch.chdir(run.parent)
+    save(Path("run/checkpoints"), 5)
+    assert load_policy("run").metadata["iteration"] == 5
+
+
+def test_a_shipped_policy_is_found_by_name_but_a_mistyped_path_is_not(tmp_path, monkeypatch, saved):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(checkpoint, "asset_path", lambda *parts: tmp_path.joinpath("assets", *parts))
+    export_policy(saved, tmp_path / "assets" / "checkpoints" / "toy")
+    assert load_policy("toy").metadata == load_policy("assets/checkpoints/toy").metadata
+    with pytest.raises(CheckpointError, match="runs/toy: no such folder"):
+        load_policy("runs/toy")
+
+
+def test_only_the_newest_are_kept(tmp_path):
+    for iteration in (1, 2, 10, 11):
+        save(tmp_path, iteration, keep=2)
+    assert names(tmp_path) == ["00000010", "00000011"]
+    save(tmp_path, 12, keep=1)
+    assert names(tmp_path) == ["00000012"]
+
+
+def test_the_same_iteration_can_be_saved_again(run):
+    save(run / "checkpoints", 4, width=9)
+    assert_same(restore_learner(run / "checkpoints", make_state(0, 9)).state, make_state(4, 9))
+    assert names(run / "checkpoints") == ["00000003", "00000004"]
+
+
+# --- damage
+
+
+def largest(folder: Path) -> Path:
+    return max((p for p in folder.rglob("*") if p.is_file()), key=lambda p: p.stat().st_size)
+
+
+def truncate(step: Path) -> Path:
+    file = largest(step / "learner")
+    file.write_bytes(file.read_bytes()[:-20])
+    return file
+
+
+def flip_a_bit(step: Path) -> Path:
+    file = largest(step / "learner")
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+    return file
+
+
+def remove_a_file(step: Path) -> Path:
+    file = largest(step / "learner")
+    file.unlink()
+    return file
+
+
+def remove_the_manifest(step: Path) -> Path:
+    (step / manifest.FILE).unlink()
+    return step / manifest.FILE
+
+
+def break_the_manifest(step: Path) -> Path:
+    (step / manifest.FILE).write_text('{"format":')
+    return step / manifest.FILE
+
+
+DAMAGES = [truncate, flip_a_bit, remove_a_file, remove_the_manifest, break_the_manifest]
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_newest_checkpoint_falls_back_to_the_one_before(run, damage):
+    file = damage(run / "checkpoints" / "00000004")
+    with pytest.warns(RuntimeWarning, match="going back to .*00000003") as warned:
+        restored = restore_learner(run / "checkpoints", make_state(0))
+    assert str(file) in str(warned[0].message)
+    assert_same(restored.state, make_state(3))
+    # Going on from 3, the damaged one does not count as one of the two that are kept.
+    save(run / "checkpoints", 5)
+    assert names(run / "checkpoints") == ["00000003", "00000005"]
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_checkpoint_asked_for_by_name_is_an_error(run, damage):
+    step = run / "checkpoints" / "00000004"
+    file = damage(step)
+    with pytest.raises(CheckpointError) as caught:
+        restore_learner(step, make_state(0))
+    assert str(file) in str(caught.value)
+
+
+def test_all_damaged_is_an_error(run):
+    for name in ("00000003", "00000004"):
+        truncate(run / "checkpoints" / name)
+    with (
+        pytest.warns(RuntimeWarning, match="going back"),
+        pytest.raises(CheckpointError, match=r"00000003.*expected \d+ bytes, got"),
+    ):
+        restore_learner(run / "checkpoints", make_state(0))
+
+
+def test_what_orbax_cannot_read_is_damaged_too(run, monkeypatch):
+    def fail(folder: Path):
+        raise RuntimeError("bad block")
+
+    monkeypatch.setattr(checkpoint, "read_item", fail)
+    with pytest.raises(CheckpointError, match=r"00000004/policy: cannot be read: bad block"):
+        load_policy(run / "checkpoints" / "00000004")
+
+
+# --- other formats, shapes and places
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"format": "else"}, "expected format 'getup_jax checkpoint'"),
+        ({"version": 9, "package": "7.1"}, "expected version 1, got 9; use getup_jax 7.1"),
+    ],
+)
+def test_another_format_is_an_error_and_no_damage(run, change, message):
+    file = run / "checkpoints" / "00000004" / manifest.FILE
+    file.write_text(json.dumps(json.loads(file.read_text()) | change))
+    with pytest.raises(CheckpointError, match=message) as caught:
+        load_policy(run)
+    assert str(file) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda tmp: tmp / "none", "none: no such folder"),
+        (lambda tmp: tmp, "holds no checkpoint; expected a run folder"),
+    ],
+)
+def test_a_missing_checkpoint_is_an_error(tmp_path, make, message):
+    with pytest.raises(CheckpointError, match=message):
+        load_policy(make(tmp_path))
+
+
+def test_a_config_of_another_version_is_an_error(run):
+    file = run / "checkpoints" / "00000004" / "config.yaml"
+    file.write_text(file.read_text() + "new_part: {x: 1}\n")
+    with pytest.raises(CheckpointError, match="new_part: unknown key.*version of getup_jax"):
+        load_policy(run)
+
+
+@pytest.mark.parametrize(
+    ("template", "message"),
+    [
+        (make_state(0, width=9), r"kernel is float32\[5, 8\], expected float32\[5, 9\]"),
+        (make_state(0).replace(rows=jnp.zeros((3, 7))), "rows is uint32.*expected float32"),
+        (make_state(0).replace(nothing=jnp.ones(2)), "state/nothing is not in the checkpoint"),
+        (make_state(0).replace(flags=None), "state/flags has no place in this network"),
+    ],
+    ids=["shape", "dtype", "missing", "extra"],
+)
+def test_another_structure_is_an_error_that_names_the_array(saved, template, message):
+    with pytest.raises(CheckpointError, match=message) as caught:
+        restore_learner(saved / "checkpoints", template)
+    assert "config.yaml" in str(caught.value)
+
+
+# --- interrupted saves
+
+
+def test_a_partial_folder_is_ignored_and_cleaned_up(run):
+    folder = run / "checkpoints"
+    partial = folder / f"{manifest.PARTIAL}00000005"
+    shutil.copytree(folder / "00000004" / "policy", partial / "policy")
+    assert restore_learner(folder, make_state(0)).metadata["iteration"] == 4
+    save(folder, 6)
+    assert names(folder) == ["00000004", "00000006"]
+
+
+@pytest.mark.parametrize("where", ["write_item", "manifest.write", "manifest.replace_folder"])
+def test_a_full_disk_costs_nothing_but_the_new_checkpoint(run, monkeypatch, where):
+    def fail(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"getup_jax.checkpoint.{where}", fail)
+        with pytest.raises(CheckpointError, match=r"00000005: could not be saved.*No space left"):
+            save(run / "checkpoints", 5)
+    assert names(run / "checkpoints") == ["00000003", "00000004"]
+    assert_same(restore_learner(run / "checkpoints", make_state(0)).state, make_state(4))
+    save(run / "checkpoints", 6)
+    assert restore_learner(run / "checkpoints", make_state(0)).metadata["iteration"] == 6
+
+
+# Orbax's own threads may outlive the failed save for a moment.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_write_that_the_system_refuses_is_an_error(run):
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+    try:
+        with pytest.raises(CheckpointError, match="could not be saved.*free disk space"):
+            save(run / "checkpoints", 5, width=4000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert restore_learner(run / "checkpoints", make_state(0)).metadata["iteration"] == 4
+
+
+KILLED = """
+import os, pathlib, signal, sys
+from getup_jax import checkpoint, config
+write = checkpoint.write_item
+def killed(folder, nested):
+    write(folder, nested)
+    if folder.name == "learner":
+        os.kill(os.getpid(), signal.SIGKILL)
+checkpoint.write_item = killed
+state = {"x": checkpoint.to_nested({"y": 1.0})["y"]}
+checkpoint.save_learner(pathlib.Path(sys.argv[1]), 5, state, config.Config(), {"policy": state})
+"""
+
+
+def test_kill_9_while_saving_costs_nothing_but_the_new_checkpoint(run):
+    folder = run / "checkpoints"
+    process = subprocess.run([sys.executable, "-c", KILLED, str(folder)], timeout=60, check=False)
+    assert process.returncode == -9
+    assert f"{manifest.PARTIAL}00000005" in names(folder)
+    assert_same(restore_learner(folder, make_state(0)).state, make_state(4))
+
+
+# --- export
+
+
+def test_export_copies_only_the_policy(saved, tmp_path):
+    exported = export_policy(saved, tmp_path / "out" / "flat")
+    assert names(exported) == ["checkpoint.json", "config.yaml", "policy"]
+    loaded, original = load_policy(exported), load_policy(saved)
+    assert_same(loaded.policy, original.policy)
+    assert_same(loaded.prior, original.prior)
+    assert dataclasses.replace(loaded.config) == original.config
+    with pytest.raises(CheckpointError, match="has no item 'learner'"):
+        restore_learner(exported, make_state(0))
+
+
+def test_an_exported_policy_names_no_folder_of_this_machine(saved, tmp_path):
+    exported = export_policy(saved, tmp_path / "flat")
+    content = b"".join(p.read_bytes() for p in exported.rglob("*") if p.is_file())
+    assert str(saved).encode() not in content
+    assert str(tmp_path).encode() not in content
+
+
+def test_an_export_can_be_replaced_but_replaces_nothing_else(saved, tmp_path):
+    export_policy(saved / "checkpoints" / "00000003", tmp_path / "flat")
+    export_policy(saved, tmp_path / "flat")
+    assert load_policy(tmp_path / "flat").metadata["iteration"] == 4
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(CheckpointError, match="mine: exists and is no checkpoint"):
+        export_policy(saved, tmp_path / "mine")
+
+
+def test_an_export_is_at_most_5_mb(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(checkpoint, "MAX_EXPORT_BYTES", 1000)
+    with pytest.raises(CheckpointError, match=r"bytes, at most 1000 are allowed"):
+        export_policy(run, tmp_path / "flat")
+    assert names(tmp_path) == ["run"]
+
+
+def test_shipped_policies_load():
+    for folder in asset_path("checkpoints").glob("*/checkpoint.json"):
+        loaded = load_policy(folder.parent)
+        assert isinstance(loaded.config, Config)
+        assert storage.is_finite({"policy": loaded.policy})
+
+
+def test_finite_looks_at_floats_only():
+    assert storage.is_finite({"a": {"b": np.arange(3)}, "c": None})
+    assert not storage.is_finite({"a": {"b": np.array([1.0, np.inf])}})

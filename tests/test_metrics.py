@@ -1,0 +1,203 @@
+from __future__ import annotations
+
+import io
+import json
+import math
+import sys
+import types
+
+import pytest
+from rich.console import Console
+
+from getup_jax.config import ConfigError
+from getup_jax.journal import Journal, means
+from getup_jax.metrics import FILE, MetricsWriter, read_metrics
+from getup_jax.progress import Display, count, describe, duration
+
+
+def write_lines(folder, *iterations: int, resume: int = 0, **metrics: float) -> None:
+    with MetricsWriter(folder, resume) as writer:
+        for i in iterations:
+            writer.write(i, i * 10, i * 0.5, {"reward": float(i), **metrics})
+
+
+def test_a_line_is_written_when_write_returns(tmp_path):
+    writer = MetricsWriter(tmp_path / "run")
+    writer.write(1, 3_000_000_000, 0.12345, {"rollout/reward": 0.5, "loss/value": math.nan})
+    line = (tmp_path / "run" / FILE).read_text()
+    assert line.count("\n") == 1
+    expected = {"iteration": 1, "steps": 3_000_000_000, "wall_s": 0.123}
+    assert json.loads(line) == {**expected, "rollout/reward": 0.5, "loss/value": None}
+    writer.close()
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_what_json_has_no_number_for_is_null_and_read_as_nan(tmp_path, value):
+    write_lines(tmp_path, 1, bad=value)
+    assert '"bad": null' in (tmp_path / FILE).read_text()
+    (row,) = read_metrics(tmp_path)
+    assert math.isnan(row["bad"])
+    assert row["reward"] == 1.0
+
+
+def test_resuming_drops_the_lines_past_the_checkpoint(tmp_path):
+    write_lines(tmp_path, 1, 2, 3, 4)
+    with MetricsWriter(tmp_path, 2) as writer:
+        assert writer.wall_s == 1.0
+    write_lines(tmp_path, 3, resume=2, again=1.0)
+    rows = read_metrics(tmp_path / FILE)
+    assert [row["iteration"] for row in rows] == [1, 2, 3]
+    assert "again" in rows[2]
+    assert [path.name for path in tmp_path.iterdir()] == [FILE]
+
+
+def test_starting_anew_drops_all_lines(tmp_path):
+    write_lines(tmp_path, 1, 2)
+    write_lines(tmp_path, 1)
+    assert [row["iteration"] for row in read_metrics(tmp_path)] == [1]
+
+
+def test_a_line_that_a_killed_run_left_unfinished_is_skipped(tmp_path):
+    write_lines(tmp_path, 1, 2)
+    with (tmp_path / FILE).open("a") as file:
+        file.write('{"iteration": 3, "ste')
+    assert len(read_metrics(tmp_path)) == 2
+    write_lines(tmp_path, 3, resume=3)
+    assert [row["iteration"] for row in read_metrics(tmp_path)] == [1, 2, 3]
+
+
+def test_a_broken_line_elsewhere_is_an_error_that_names_it(tmp_path):
+    (tmp_path / FILE).write_text('{"iteration": 1}\nnonsense\n{"iteration": 3}\n')
+    with pytest.raises(ValueError, match=r"metrics.jsonl, line 2: not a JSON object"):
+        read_metrics(tmp_path)
+
+
+def test_a_missing_file_is_an_error(tmp_path):
+    with pytest.raises(FileNotFoundError, match="no such file; expected a run folder"):
+        read_metrics(tmp_path / "none")
+
+
+def test_a_metric_cannot_take_a_name_of_the_line_itself(tmp_path):
+    with MetricsWriter(tmp_path) as writer, pytest.raises(ValueError, match="steps"):
+        writer.write(1, 1, 1.0, {"steps": 2.0})
+
+
+def test_tensorboard_gets_the_finite_numbers(tmp_path, monkeypatch):
+    written, opened = [], {}
+
+    class SummaryWriter:
+        def __init__(self, folder, purge_step):
+            opened.update(folder=folder, purge_step=purge_step)
+
+        def add_scalar(self, *scalar):
+            written.append(scalar)
+
+        def close(self):
+            written.append("closed")
+
+    module = types.SimpleNamespace(SummaryWriter=SummaryWriter)
+    monkeypatch.setitem(sys.modules, "tensorboardX", module)
+    write_lines(tmp_path, 1, 2)
+    with MetricsWriter(tmp_path, 1, tensorboard=True) as writer:
+        writer.write(2, 20, 1.0, {"a": 0.5, "b": math.nan})
+    assert written == [("a", 0.5, 20), "closed"]
+    assert opened == {"folder": str(tmp_path / "tensorboard"), "purge_step": 11}
+
+
+def test_tensorboard_that_is_not_installed_says_how_to_install_it(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "tensorboardX", None)
+    with pytest.raises(ConfigError, match=r"pip install 'getup-jax\[tensorboard\]'"):
+        MetricsWriter(tmp_path, tensorboard=True)
+
+
+# --- means over iterations
+
+
+def test_means_leave_nan_out():
+    rows = [{"a": 1.0, "b": math.nan}, {"a": 3.0, "b": 4.0}, {"a": 5.0, "b": math.nan}]
+    assert means(rows) == {"a": 3.0, "b": 4.0}
+    assert math.isnan(means(rows[::2])["b"])
+
+
+def test_a_journal_writes_means_and_speed(tmp_path):
+    with MetricsWriter(tmp_path) as writer, Display(100, quiet=True) as display:
+        journal = Journal(writer, display, per_iteration=10, done=4)
+        journal.flush(4)
+        journal.add({"rollout/reward": 1.0})
+        journal.add({"rollout/reward": 3.0})
+        journal.flush(6)
+        journal.flush(6)
+    (row,) = read_metrics(tmp_path)
+    assert (row["iteration"], row["steps"], row["rollout/reward"]) == (6, 60, 2.0)
+    assert row["steps_per_s"] > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "diverged"),
+    [
+        ("loss/value", math.nan, True),
+        ("ppo/gradient_norm", math.inf, True),
+        ("loss/value", 1e30, False),
+        ("episode/success", math.nan, False),
+    ],
+)
+def test_a_journal_tells_divergence_from_no_episode(tmp_path, name, value, diverged):
+    with MetricsWriter(tmp_path) as writer, Display(1, quiet=True) as display:
+        assert Journal(writer, display, 1, 0).add({name: value}) == ([name] if diverged else [])
+
+
+# --- the display
+
+
+METRICS = {"rollout/reward": 0.25, "episode/return_rate": 0.5, "episode/success": math.nan}
+
+
+def test_the_progress_line():
+    expected = "50 k/100 M steps  8 k/s  3 h 28 min left  reward 0.250  return rate 0.500"
+    assert describe(50_000, 100_000_000, 8000.0, METRICS) == expected
+    assert describe(0, 1000, 0.0, {}) == "0/1 k steps"
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [(0, "0"), (850, "850"), (12_340, "12.3 k"), (4_560_000, "4.56 M"), (2 * 10**9, "2 G")],
+)
+def test_counts(number, text):
+    assert count(number) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.4, "0 s"), (59.6, "1 min 00 s"), (200, "3 min 20 s"), (7500, "2 h 05 min")]
+)
+def test_durations(seconds, text):
+    assert duration(seconds) == text
+
+
+def show(quiet: bool, terminal: bool) -> str:
+    console = Console(file=io.StringIO(), force_terminal=terminal, width=120, soft_wrap=True)
+    with Display(1000, quiet, console) as display:
+        display.log("compiling [bold] ...")
+        display.start(0)
+        display.update(500, 100.0, METRICS)
+        display.close()
+        display.log("done")
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue()
+
+
+def test_plain_lines_where_there_is_no_terminal():
+    update = "500/1 k steps  100/s  5 s left  reward 0.250  return rate 0.500"
+    assert show(quiet=False, terminal=False).splitlines() == ["compiling [bold] ...", update, "done"]
+
+
+def test_a_bar_on_a_terminal():
+    text = show(quiet=False, terminal=True)
+    assert "━" in text
+    assert "500/1 k steps  100/s  5 s left" in text
+    assert text.index("compiling [bold]") < text.index("500/1 k") < text.index("done")
+    assert text.rindex("\x1b[?25h") > text.rindex("\x1b[?25l")  # the cursor is shown again
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_quiet_is_silent(terminal):
+    assert show(quiet=True, terminal=terminal) == ""

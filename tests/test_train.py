@@ -1,0 +1,319 @@
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from flax import struct
+
+from getup_jax import checkpoint, loop, runfolder
+from getup_jax.config import Config
+from getup_jax.loop import Job, TrainingError
+from getup_jax.metrics import read_metrics
+from getup_jax.progress import Display
+from getup_jax.settings import load_config
+from getup_jax.storage import CheckpointError
+from getup_jax.train import run
+
+PER_ITERATION = 8  # samples of an iteration of `settings()`
+
+
+@struct.dataclass
+class Policy:
+    weight: jax.Array
+
+
+@struct.dataclass
+class LearnerState:
+    policy: Policy
+    count: jax.Array
+
+
+@struct.dataclass
+class State:
+    learner: LearnerState
+    environment: jax.Array
+    key: jax.Array
+    iteration: jax.Array
+
+
+class ToyLearner:
+    """A random walk: each iteration depends on the state, the world and the folded key."""
+
+    def __init__(self, bad_loss_at: int = -1, bad_weight_at: int = -1) -> None:
+        self.traces = 0
+        self._bad_loss_at, self._bad_weight_at = bad_loss_at, bad_weight_at
+
+    def init(self, world: Any, key: jax.Array) -> State:
+        learner = LearnerState(Policy(jax.random.normal(key, (4,))), jnp.zeros((), jnp.int32))
+        rows = jax.random.bits(key, (3, 2), jnp.uint32)
+        return State(learner, rows, jnp.array(key), jnp.zeros((), jnp.int32))
+
+    def iteration(self, world: Any, state: State) -> tuple[State, dict[str, jax.Array]]:
+        self.traces += 1
+        number = state.iteration + 1
+        noise = jax.random.normal(jax.random.fold_in(state.key, state.iteration), (4,))
+        weight = state.learner.policy.weight * 0.9 + noise * world["scale"]
+        reward = weight.sum() + state.environment[0, 0].astype(jnp.float32)
+        weight = jnp.where(number == self._bad_weight_at, jnp.nan, weight)
+        metrics = {
+            "rollout/reward": reward,
+            "episode/success": jnp.where(number % 2 == 0, 1.0, jnp.nan),
+            "loss/value": jnp.where(number == self._bad_loss_at, jnp.nan, 1.0),
+        }
+        learner = LearnerState(Policy(weight), state.learner.count + 1)
+        return State(learner, state.environment * 3 + 1, state.key, number), metrics
+
+
+def builder(learner: ToyLearner | None = None, log: list[str] | None = None):
+    def build(config: Config, say) -> Job:
+        say("toy task")
+        world = {"scale": np.float32(0.1)}
+        return Job(learner or ToyLearner(), world, {"decoder": jnp.ones(2)})
+
+    return build
+
+
+def settings(iterations: int, *overrides: str) -> Config:
+    sizes = ["ppo.num_envs=4", "ppo.num_steps=2", "ppo.minibatch_size=4", "train.save_every_s=1e9"]
+    total = f"train.total_steps={iterations * PER_ITERATION - 3}"
+    return load_config(None, [*sizes, total, *overrides])
+
+
+def train(folder: Path, iterations: int, *overrides: str, resume=False, learner=None, quiet=True):
+    return run(settings(iterations, *overrides), folder, resume, quiet, builder(learner))
+
+
+def arrays(folder: Path) -> dict[str, Any]:
+    """The whole state of the run's newest checkpoint."""
+    newest = checkpoint.steps(folder / "checkpoints")[-1]
+    return checkpoint.read_item(newest / "learner")
+
+
+def saved(folder: Path) -> list[int]:
+    return [int(step.name) for step in checkpoint.steps(folder / "checkpoints")]
+
+
+def history(folder: Path) -> list[tuple[Any, ...]]:
+    """What must be the same in every run of the same settings."""
+    keys = ("iteration", "steps", "rollout/reward", "loss/value")
+    return [tuple(row[key] for key in keys) for row in read_metrics(folder)]
+
+
+def test_a_run_from_start_to_end(tmp_path):
+    learner = ToyLearner()
+    assert train(tmp_path, 5, learner=learner) is None
+    assert [row[:2] for row in history(tmp_path)] == [(i, 8 * i) for i in range(1, 6)]
+    assert load_config(tmp_path / "config.yaml") == settings(5)
+    assert saved(tmp_path) == [5]
+    loaded = checkpoint.load_policy(tmp_path)
+    assert loaded.metadata == {"iteration": 5, "steps": 40}
+    assert loaded.prior["decoder"].tolist() == [1, 1]
+    np.testing.assert_array_equal(
+        loaded.policy["weight"], arrays(tmp_path)["state"]["learner"]["policy"]["weight"]
+    )
+
+
+def test_a_run_compiles_once(tmp_path):
+    learner = ToyLearner()
+    train(tmp_path, 3, learner=learner)
+    train(tmp_path, 6, resume=True, learner=learner)
+    assert learner.traces == 2
+
+
+def test_a_resumed_run_equals_an_unbroken_one(tmp_path):
+    train(tmp_path / "once", 7)
+    train(tmp_path / "twice", 3)
+    train(tmp_path / "twice", 7, resume=True)
+    assert history(tmp_path / "twice") == history(tmp_path / "once")
+    jax.tree.map(np.testing.assert_array_equal, arrays(tmp_path / "once"), arrays(tmp_path / "twice"))
+    wall = [row["wall_s"] for row in read_metrics(tmp_path / "twice")]
+    assert wall == sorted(wall)
+
+
+def test_a_damaged_newest_checkpoint_costs_only_its_iterations(tmp_path):
+    train(tmp_path / "once", 6)
+    run_folder = tmp_path / "broken"
+    train(run_folder, 2)
+    train(run_folder, 4, resume=True)
+    (run_folder / "checkpoints" / "00000004" / "checkpoint.json").write_text("")
+    with pytest.warns(RuntimeWarning, match="going back to .*00000002"):
+        train(run_folder, 6, resume=True)
+    assert history(run_folder) == history(tmp_path / "once")
+
+
+def test_log_every_writes_the_means_of_its_iterations(tmp_path):
+    train(tmp_path / "each", 5)
+    train(tmp_path / "some", 5, "train.log_every=2")
+    each = [row["rollout/reward"] for row in read_metrics(tmp_path / "each")]
+    rows = read_metrics(tmp_path / "some")
+    assert [row["iteration"] for row in rows] == [2, 4, 5]
+    expected = [np.mean(each[0:2]), np.mean(each[2:4]), each[4]]
+    np.testing.assert_allclose([row["rollout/reward"] for row in rows], expected, rtol=1e-6)
+    assert rows[0]["episode/success"] == 1.0
+
+
+def test_saves_by_wall_time_and_keeps_as_many_as_set(tmp_path):
+    train(tmp_path, 4, "train.save_every_s=0", "train.keep=3")
+    assert saved(tmp_path) == [2, 3, 4]
+
+
+def test_another_seed_is_another_run(tmp_path):
+    train(tmp_path / "a", 2)
+    train(tmp_path / "b", 2, "seed=1")
+    assert history(tmp_path / "a") != history(tmp_path / "b")
+
+
+def test_a_run_can_start_from_the_policy_of_another(tmp_path):
+    train(tmp_path / "first", 3)
+    train(tmp_path / "second", 1, f"train.init_from={tmp_path / 'first'}")
+    train(tmp_path / "third", 1)
+    assert history(tmp_path / "second") != history(tmp_path / "third")
+    # The environment's rows are those of a fresh run: only the policy was taken.
+    fresh, started = (arrays(tmp_path / name)["state"] for name in ("third", "second"))
+    np.testing.assert_array_equal(fresh["environment"], started["environment"])
+
+
+# --- the run folder
+
+
+def test_a_folder_that_holds_something_is_not_overwritten(tmp_path):
+    train(tmp_path, 1)
+    before = arrays(tmp_path)
+    with pytest.raises(runfolder.RunError, match="holds a run already; add --resume"):
+        train(tmp_path, 2)
+    jax.tree.map(np.testing.assert_array_equal, arrays(tmp_path), before)
+
+
+def test_resume_without_a_checkpoint_starts_from_the_beginning(tmp_path):
+    train(tmp_path / "once", 2)
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "metrics.jsonl").write_text('{"iteration": 1, "steps": 8, "wall_s": 1}\n')
+    train(tmp_path / "run", 2, resume=True)
+    assert history(tmp_path / "run") == history(tmp_path / "once")
+
+
+def test_resuming_a_finished_run_does_nothing(tmp_path, capsys):
+    train(tmp_path, 2)
+    learner = ToyLearner()
+    assert train(tmp_path, 2, resume=True, learner=learner, quiet=False) is None
+    assert learner.traces == 0
+    assert "has all of its 16 steps" in capsys.readouterr().out
+
+
+def test_resuming_names_the_settings_that_changed(tmp_path, capsys):
+    train(tmp_path, 1)
+    train(tmp_path, 2, "ppo.clip=0.3", resume=True, quiet=False)
+    assert "resuming with ppo.clip = 0.3 instead of 0.2" in capsys.readouterr().out
+
+
+def test_the_user_hears_of_every_stage(tmp_path, capsys):
+    train(tmp_path, 2, quiet=False)
+    lines = capsys.readouterr().out.splitlines()
+    stages = ["building the task (cpu)", "toy task", "compiling", "compiled in", "8/16 steps"]
+    assert [line[: len(stage)] for line, stage in zip(lines, stages, strict=False)] == stages
+    assert lines[-1].strip() == f"getup-eval --ckpt {tmp_path}"
+
+
+# --- divergence and full disks
+
+
+def test_a_loss_that_is_not_finite_stops_the_run_and_keeps_the_last_good_checkpoint(tmp_path):
+    with pytest.raises(TrainingError) as caught:
+        train(tmp_path, 9, "train.save_every_s=0", learner=ToyLearner(bad_loss_at=4))
+    text = str(caught.value)
+    assert text.startswith("iteration 4: loss/value: not a finite number; the last good checkpoint")
+    assert str(tmp_path / "checkpoints" / "00000003") in text
+    assert saved(tmp_path) == [2, 3]
+    assert np.isnan(read_metrics(tmp_path)[-1]["loss/value"])
+
+
+def test_weights_that_are_not_finite_are_not_saved(tmp_path):
+    with pytest.raises(TrainingError, match="iteration 3: a weight of the policy"):
+        train(tmp_path, 9, "train.save_every_s=0", learner=ToyLearner(bad_weight_at=3))
+    assert saved(tmp_path) == [1, 2]
+
+
+def full_disk(*_: Any) -> None:
+    raise CheckpointError("00000002: could not be saved: No space left on device")
+
+
+def test_a_disk_that_is_full_for_a_while_does_not_end_the_run(tmp_path, monkeypatch, capsys):
+    save = checkpoint.save_learner
+
+    def sometimes(folder, iteration, *rest):
+        return full_disk() if iteration == 2 else save(folder, iteration, *rest)
+
+    monkeypatch.setattr(loop.checkpoint, "save_learner", sometimes)
+    assert train(tmp_path, 4, "train.save_every_s=0", quiet=False) is None
+    assert "warning: 00000002: could not be saved" in capsys.readouterr().out
+    assert saved(tmp_path) == [3, 4]
+
+
+def test_a_disk_that_is_full_at_the_end_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(loop.checkpoint, "save_learner", full_disk)
+    with pytest.raises(CheckpointError, match="No space left"):
+        train(tmp_path, 2)
+
+
+# --- signals
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_saves_and_the_run_resumes(tmp_path, monkeypatch, capsys, number):
+    update = Display.update
+
+    def update_and_signal(self, steps, *rest):
+        update(self, steps, *rest)
+        if steps == 2 * PER_ITERATION:
+            os.kill(os.getpid(), number)
+            time.sleep(0.2)
+
+    handlers = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with monkeypatch.context() as patch:
+        patch.setattr(Display, "update", update_and_signal)
+        assert train(tmp_path / "run", 6, quiet=False) == number
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == handlers
+    assert saved(tmp_path / "run") == [2]
+    out = capsys.readouterr().out
+    assert "stopping after this iteration" in out
+    assert f"getup-train {tmp_path}/run/config.yaml --run {tmp_path}/run --resume" in out
+    train(tmp_path / "run", 6, resume=True)
+    train(tmp_path / "once", 6)
+    assert history(tmp_path / "run") == history(tmp_path / "once")
+
+
+STOPPED = """
+import os, signal, sys, time
+from getup_jax.stop import StopRequest
+with StopRequest(print) as stop:
+    if sys.argv[1] == "armed":
+        with stop.armed():
+            os.kill(os.getpid(), signal.SIGTERM)
+            while stop.signal is None:
+                time.sleep(0.01)
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.1)
+            print("still here", flush=True)
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(30)
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(30)
+"""
+
+
+@pytest.mark.parametrize(("mode", "alive"), [("armed", True), ("not armed", False)])
+def test_a_second_ctrl_c_and_one_before_the_loop_exit_at_once(mode, alive):
+    command = [sys.executable, "-c", STOPPED, mode]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
+    assert done.returncode == 128 + signal.SIGINT
+    assert ("still here" in done.stdout) == alive
+    assert done.stderr.strip() == "stopped at once; nothing was saved"
