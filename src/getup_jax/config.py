@@ -26,21 +26,21 @@ class PhysicsConfig:
     engine: str = "auto"  # auto | native | mjx | mjx-warp; auto: native on a CPU, mjx elsewhere
     character: str = "humanoid49"  # assets/NAME.xml, or a path to an MJCF file
     control_hz: int = 30  # policy rate
-    substeps: int = 4  # physics steps in one control period
-    solver: str = "newton"  # newton | cg | pgs (pgs: native only)
-    iterations: int = 5  # solver iterations at most
-    gain_scale: float = 1.0  # times the stiffness and damping of the MJCF file
+    substeps: int = 2  # physics steps in one control period
+    solver: str = "auto"  # newton | cg | pgs; auto: pgs on native, newton on MJX, which has no pgs
+    iterations: int = 10  # solver iterations at most
+    gain_scale: float = 2.0  # times the stiffness and damping of the MJCF file
     torque_scale: float = 1.0  # times the torque limits of the MJCF file
-    armature: float = 0.05  # kg m^2, added to every hinge
+    armature: float = 0.1  # kg m^2, added to every hinge
     threads: int = 0  # native: worker threads; 0: every CPU this process may use
 
     def __post_init__(self) -> None:
         engines = ("auto", "native", "mjx", "mjx-warp")
         _require(self.engine in engines, "physics.engine", f"one of {engines}", self.engine)
-        solvers = ("newton", "cg", "pgs")
+        solvers = ("auto", "newton", "cg", "pgs")
         _require(self.solver in solvers, "physics.solver", f"one of {solvers}", self.solver)
         mjx_pgs = self.engine.startswith("mjx") and self.solver == "pgs"
-        _require(not mjx_pgs, "physics.solver", "newton or cg, since MJX has no PGS", self.solver)
+        _require(not mjx_pgs, "physics.solver", "auto, newton or cg, since MJX has no PGS", self.solver)
         for name in ("control_hz", "substeps", "iterations", "gain_scale", "torque_scale"):
             _require(getattr(self, name) > 0, f"physics.{name}", "more than 0", getattr(self, name))
         _require(self.armature >= 0, "physics.armature", "at least 0", self.armature)

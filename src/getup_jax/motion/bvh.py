@@ -28,7 +28,7 @@ class BvhOptions:
     allow_short: bool = False  # take files with another row count than the header says
 
 
-def read_bvh(path: str | Path, options: BvhOptions = BvhOptions()) -> Recording:  # noqa: B008
+def read_bvh(path: str | Path, options: BvhOptions = BvhOptions()) -> Recording:
     """The motion of a BVH file; MotionError names the file, the line and the joint."""
     path = Path(path)
     lines = _lines(path)

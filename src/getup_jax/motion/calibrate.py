@@ -70,7 +70,9 @@ def _bone(recording: Recording, links: Mapping[str, int], link: str) -> np.ndarr
         children = [i for i, parent in enumerate(recording.parents) if parent == joint]
         inner = recording.offsets[children[0]] if len(children) == 1 else np.zeros(3)
         bone = recording.ends.get(joint, inner)
-    return bone if np.linalg.norm(bone) > 1e-3 * max(1e-9, np.abs(recording.offsets).max()) else None
+    return (
+        bone if np.linalg.norm(bone) > 1e-3 * max(1e-9, np.abs(recording.offsets).max()) else None
+    )
 
 
 class _Moving:

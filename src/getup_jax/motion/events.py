@@ -84,7 +84,9 @@ def heights_of(positions: np.ndarray, character: CharacterSpec) -> Heights:
 
 
 def find_events(
-    heights: Heights, fps: float, settings: EventSettings = EventSettings()  # noqa: B008
+    heights: Heights,
+    fps: float,
+    settings: EventSettings = EventSettings(),
 ) -> list[Event]:
     """The get-ups of a clip in order of time."""
     lying = (heights.head < settings.lie_head) & (heights.pelvis < settings.lie_pelvis)
@@ -104,7 +106,7 @@ def find_events(
     return events
 
 
-def orientation(front_up: float, settings: EventSettings = EventSettings()) -> str:  # noqa: B008
+def orientation(front_up: float, settings: EventSettings = EventSettings()) -> str:
     """supine, prone or side, by the cosine between the torso's front and up."""
     if abs(front_up) < settings.side_cosine:
         return "side"
@@ -124,9 +126,7 @@ def _phases(lying: np.ndarray, standing: np.ndarray, gap: float) -> list[tuple[i
     return phases
 
 
-def _event(
-    heights: Heights, start: int, last: int, stand: int, settings: EventSettings
-) -> Event:
+def _event(heights: Heights, start: int, last: int, stand: int, settings: EventSettings) -> Event:
     """Fill in the last flat frame: the one before head or pelvis leave the floor for good."""
     head, pelvis = heights.head[start : last + 1], heights.pelvis[start : last + 1]
     flat = np.flatnonzero((head < settings.flat_head) & (pelvis < settings.flat_pelvis))

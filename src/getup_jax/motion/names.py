@@ -121,9 +121,7 @@ def _words(name: str) -> tuple[str, str]:
     return "", bare
 
 
-def _add_trunk(
-    found: dict[str, int], parents: Sequence[int], taken: set[int]
-) -> dict[str, int]:
+def _add_trunk(found: dict[str, int], parents: Sequence[int], taken: set[int]) -> dict[str, int]:
     """The spine is what lies between the pelvis and the joint that carries the arms."""
     if "pelvis" not in found or "arm_l" not in found:
         return found

@@ -21,7 +21,7 @@ class ReadOptions:
     allow_short: bool = False  # take BVH files with another row count than the header says
 
 
-def read_motion(path: str | Path, options: ReadOptions = ReadOptions()) -> Recording:  # noqa: B008
+def read_motion(path: str | Path, options: ReadOptions = ReadOptions()) -> Recording:
     """The recording in a file, Z up, lengths in the file's own unit."""
     path = Path(path)
     suffix = path.suffix.lower()

@@ -65,7 +65,7 @@ class RetargetReport:
 def retarget(
     recording: Recording,
     character: CharacterSpec,
-    settings: RetargetSettings = RetargetSettings(),  # noqa: B008
+    settings: RetargetSettings = RetargetSettings(),
 ) -> tuple[Clip, RetargetReport]:
     """The recording's motion on the character, and how well it fits.
 

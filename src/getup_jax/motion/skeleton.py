@@ -46,7 +46,9 @@ class Recording:
 def forward(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """World positions [F, N, 3] (m) and rotation matrices [F, N, 3, 3] of all joints."""
     local = Rotation.from_quat(recording.rotations.reshape(-1, 4), scalar_first=True).as_matrix()
-    return _chain(recording, recording.translations, local.reshape(*recording.rotations.shape[:2], 3, 3))
+    return _chain(
+        recording, recording.translations, local.reshape(*recording.rotations.shape[:2], 3, 3)
+    )
 
 
 def rest_positions(recording: Recording) -> np.ndarray:

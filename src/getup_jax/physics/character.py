@@ -14,6 +14,7 @@ from getup_jax.config import ConfigError, PhysicsConfig
 from getup_jax.paths import asset_path
 
 _SOLVERS = {
+    "auto": mujoco.mjtSolver.mjSOL_PGS,  # the MJX engine, which has none, takes Newton
     "newton": mujoco.mjtSolver.mjSOL_NEWTON,
     "cg": mujoco.mjtSolver.mjSOL_CG,
     "pgs": mujoco.mjtSolver.mjSOL_PGS,

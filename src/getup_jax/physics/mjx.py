@@ -6,6 +6,7 @@ else that MJX keeps is derived from them at the start of a step.
 
 from __future__ import annotations
 
+import copy
 import functools
 from typing import Any
 
@@ -36,10 +37,11 @@ class MjxEngine:
         self.name = "mjx" if impl == "jax" else f"mjx-{impl}"
         self.control_dt = 1.0 / config.control_hz
         self._substeps = config.substeps
-        if character.model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
-            character.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
-        self._model = _put_model(character.model, impl)
-        self._data = mjx.make_data(character.model, impl=impl)
+        model = copy.copy(character.model)
+        if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
+            model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        self._model = _put_model(model, impl)
+        self._data = mjx.make_data(model, impl=impl)
 
     def place(self, qpos: jax.Array, qvel: jax.Array) -> PhysicsState:
         """See `Engine.place`."""
@@ -83,9 +85,7 @@ class MjxEngine:
         return self._kinematics(self._load(state), jnp.zeros(self._model.nu))
 
     def _load(self, state: MjxState) -> Any:
-        return self._data.replace(
-            qpos=state.qpos, qvel=state.qvel, qacc_warmstart=state.warmstart
-        )
+        return self._data.replace(qpos=state.qpos, qvel=state.qvel, qacc_warmstart=state.warmstart)
 
     def _kinematics(self, data: Any, torque: jax.Array) -> Kinematics:
         """Link motion at the state's own positions; `step` leaves that of one substep ago."""
@@ -123,4 +123,3 @@ def _put_model(model: mujoco.MjModel, impl: str) -> Any:
             f"physics.engine: MJX cannot use impl {impl!r} here ({error}); for mjx-warp install "
             "the extra: pip install 'getup-jax[warp]'"
         ) from error
-

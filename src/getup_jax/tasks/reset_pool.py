@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 
 import jax
@@ -11,13 +12,15 @@ import numpy as np
 from flax import struct
 
 from getup_jax.config import ConfigError, TaskConfig
-from getup_jax.motion.clips import GetUp
+from getup_jax.motion.clips import Clip, GetUp
 from getup_jax.motion.features import FeatureLinks, features
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.tasks.episode import CLIP, LYING, STANDING
+from getup_jax.tasks.episode import CLIP, STANDING
 from getup_jax.types import Engine, PhysicsState, take
 
 _SETTLE_LIFT_M = 0.01  # poses are dropped from this height
+
+_Start = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @struct.dataclass
@@ -36,90 +39,91 @@ def build_pool(
 
     A kind with no share still gets one row a style, so that the table has one form.
     """
-    rng = np.random.default_rng(seed)
-    shares = _shares(config)
+    shares = kind_shares(config)
     rows = max(1, config.pool_size // max(1, len(getups) * sum(s > 0 for s in shares)))
     counts = [rows if share > 0 else 1 for share in shares]
-    makers = (_lying_rows, _standing_rows, _clip_rows)
+    poses = [g.clip.qpos[0] for g in getups if g.clip is not None]
+    make = _StartMaker(character, config, np.random.default_rng(seed), poses)
     starts, table, offset = [], np.zeros((3, len(getups), rows), np.int32), 0
-    first_poses = lying_poses(getups)
-    for kind, (make, count) in enumerate(zip(makers, counts, strict=True)):
+    for kind, count in enumerate(counts):
         for index, getup in enumerate(getups):
-            starts.append(make(getup, count, character, config, rng, first_poses))
+            starts.append(make.start(kind, getup, count))
             table[kind, index] = offset + np.arange(rows) % count
             offset += count
     qpos, qvel, time = (np.concatenate(part) for part in zip(*starts, strict=True))
     lying = np.repeat([True, False, False], [len(getups) * count for count in counts])
     physics = _settle(engine, character, qpos, qvel, lying, config.settle_s)
     _check_finite(physics, qpos)
-    return Pool(
-        physics=physics, time=jnp.asarray(time, jnp.float32), table=jnp.asarray(table)
-    )
+    return Pool(physics=physics, time=jnp.asarray(time, jnp.float32), table=jnp.asarray(table))
 
 
-def lying_poses(getups: Sequence[GetUp]) -> list[np.ndarray]:
-    """First pose of every reference motion."""
-    return [g.clip.qpos[0] for g in getups if g.clip is not None]
-
-
-def _shares(config: TaskConfig) -> tuple[float, float, float]:
-    """Shares of the kinds LYING, STANDING, CLIP; they sum to 1."""
+def kind_shares(config: TaskConfig) -> tuple[float, float, float]:
+    """Shares of the kinds LYING, STANDING and CLIP, in this order; they sum to 1."""
     lying = 1.0 - config.stand_start - config.clip_start
-    shares = {LYING: lying, STANDING: config.stand_start, CLIP: config.clip_start}
-    return tuple(shares[kind] for kind in (LYING, STANDING, CLIP))  # type: ignore[return-value]
+    return lying, config.stand_start, config.clip_start
 
 
-def _lying_rows(getup, count, character, config, rng, first_poses):  # noqa: ANN001, ANN202
-    poses = [getup.clip.qpos[0]] if getup.clip is not None else first_poses
-    fitting = [p for p in poses if _angle_gap(p, getup, character) <= config.curve_match_rad]
-    if not fitting:
-        gap = min((_angle_gap(p, getup, character) for p in poses), default=float("nan"))
-        raise ConfigError(
-            f"get-up {getup.name!r}: its first torso angles are {gap:.2f} rad from the nearest lying "
-            f"pose, more than task.curve_match_rad = {config.curve_match_rad}; leave it out of "
-            "motion.curves or add a motion that starts like it"
+@dataclasses.dataclass(frozen=True)
+class _StartMaker:
+    """Makes qpos [n, 7 + J], qvel [n, 6 + J] and time [n] of n start states of one style."""
+
+    character: CharacterSpec
+    config: TaskConfig
+    rng: np.random.Generator
+    lying_poses: list[np.ndarray]  # first poses of all reference motions
+
+    def start(self, kind: int, getup: GetUp, count: int) -> _Start:
+        if kind == STANDING:
+            qpos = self._noisy(np.tile(self.character.neutral_qpos, (count, 1)))
+            return qpos, self._at_rest(qpos), np.full(count, getup.duration)
+        if kind == CLIP and getup.clip is not None:
+            return self._along(getup.clip, count)
+        # a curve alone has no poses on its way: it starts lying in any case
+        fitting = self._fitting(getup)
+        qpos = self._noisy(
+            np.stack([fitting[i] for i in self.rng.integers(len(fitting), size=count)])
         )
-    pick = rng.integers(len(fitting), size=count)
-    qpos = np.stack([fitting[i] for i in pick])
-    qpos = _noisy(qpos, config.start_noise_rad, character, rng)
-    return qpos, np.zeros((count, qpos.shape[1] - 1)), np.zeros(count)
+        return qpos, self._at_rest(qpos), np.zeros(count)
 
+    def _along(self, clip: Clip, count: int) -> _Start:
+        """Poses and velocities of random frames."""
+        model = self.character.model
+        frame = self.rng.integers(0, len(clip.qpos) - 1, size=count)
+        qvel = np.zeros((count, model.nv))
+        for row, f in zip(qvel, frame, strict=True):
+            mujoco.mj_differentiatePos(model, row, 1.0 / clip.fps, clip.qpos[f], clip.qpos[f + 1])
+        return clip.qpos[frame], qvel, frame / clip.fps
 
-def _standing_rows(getup, count, character, config, rng, _):  # noqa: ANN001, ANN202
-    qpos = np.tile(character.neutral_qpos, (count, 1))
-    qpos = _noisy(qpos, config.start_noise_rad, character, rng)
-    return qpos, np.zeros((count, qpos.shape[1] - 1)), np.full(count, getup.duration)
+    def _fitting(self, getup: GetUp) -> list[np.ndarray]:
+        """Lying poses whose torso angles are near the curve's first ones [P 5.2]."""
+        poses = self.lying_poses if getup.clip is None else [getup.clip.qpos[0]]
+        gaps = [angle_gap(pose, getup, self.character) for pose in poses]
+        limit = self.config.curve_match_rad
+        fitting = [pose for pose, gap in zip(poses, gaps, strict=True) if gap <= limit]
+        if not fitting:
+            raise ConfigError(
+                f"get-up {getup.name!r}: its first torso angles are "
+                f"{min(gaps, default=np.nan):.2f} rad from the nearest lying pose, more than "
+                f"task.curve_match_rad = {limit}; leave it out of motion.curves or add a motion "
+                "that starts like it"
+            )
+        return fitting
 
+    def _at_rest(self, qpos: np.ndarray) -> np.ndarray:
+        return np.zeros((len(qpos), self.character.model.nv))
 
-def _clip_rows(getup, count, character, config, rng, first_poses):  # noqa: ANN001, ANN202
-    clip = getup.clip
-    if clip is None:  # a curve alone has no poses on the way: it starts lying
-        return _lying_rows(getup, count, character, config, rng, first_poses)
-    frame = rng.integers(0, len(clip.qpos) - 1, size=count)
-    qpos, qvel = clip.qpos[frame], np.zeros((count, character.model.nv))
-    for i, f in enumerate(frame):
-        mujoco.mj_differentiatePos(
-            character.model, qvel[i], 1.0 / clip.fps, clip.qpos[f], clip.qpos[f + 1]
-        )
-    return qpos, qvel, frame / clip.fps
-
-
-def _noisy(
-    qpos: np.ndarray, noise_rad: float, character: CharacterSpec, rng: np.random.Generator
-) -> np.ndarray:
-    """Joint noise within the limits, and any heading."""
-    qpos = qpos.copy()
-    joints = qpos[:, 7:] + rng.normal(0.0, 1.0, qpos[:, 7:].shape) * noise_rad
-    qpos[:, 7:] = np.clip(joints, character.joint_lower, character.joint_upper)
-    if noise_rad > 0:
-        for row in qpos:
-            yaw = rng.uniform(-np.pi, np.pi)
+    def _noisy(self, qpos: np.ndarray) -> np.ndarray:
+        """Joint noise within the limits, and any heading."""
+        qpos, character, noise = qpos.copy(), self.character, self.config.start_noise_rad
+        joints = qpos[:, 7:] + noise * self.rng.standard_normal(qpos[:, 7:].shape)
+        qpos[:, 7:] = np.clip(joints, character.joint_lower, character.joint_upper)
+        for row, yaw in zip(qpos, self.rng.uniform(-np.pi, np.pi, len(qpos)), strict=True):
             turn = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
             mujoco.mju_mulQuat(row[3:7], turn, row[3:7].copy())
-    return qpos
+        return qpos
 
 
-def _angle_gap(qpos: np.ndarray, getup: GetUp, character: CharacterSpec) -> float:
+def angle_gap(qpos: np.ndarray, getup: GetUp, character: CharacterSpec) -> float:
     """Largest difference between a pose's torso angles and the curve's first ones (rad)."""
     data = mujoco.MjData(character.model)
     data.qpos[:] = qpos

@@ -30,7 +30,7 @@ def phase(target_height: jax.Array, final_height: jax.Array) -> jax.Array:
 
 
 def velocity(angular_velocity: jax.Array, alpha: jax.Array) -> jax.Array:
-    """Equation 7: r_v = (1 - alpha) + alpha exp(-.05 |omega|); omega [..., 3 x 19] as one vector."""
+    """Equation 7: r_v = (1 - alpha) + alpha exp(-.05 |omega|); omega [..., 57] of 19 links."""
     norm = jnp.linalg.norm(angular_velocity, axis=-1)
     return (1.0 - alpha) + alpha * jnp.exp(-0.05 * norm)
 
@@ -41,7 +41,7 @@ def posture(joint_angle: jax.Array, alpha: jax.Array) -> jax.Array:
 
 
 def natural(offset: jax.Array, limit: float) -> jax.Array:
-    """Equation 3: r_natural = 1 - clip((|dq|_1 / c)^2, 0, 1); filtered offsets [..., J], c in rad."""
+    """Equation 3: r_natural = 1 - clip((|dq|_1 / c)^2, 0, 1); dq [..., J] and c in rad."""
     share = jnp.sum(jnp.abs(offset), axis=-1) / limit
     return 1.0 - jnp.clip(share**2, 0.0, 1.0)
 

@@ -1,0 +1,162 @@
+"""All motions that a config names: get-ups to train on and poses for the pose prior."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from getup_jax.config import MotionConfig
+from getup_jax.motion.cache import Job, read_npz, retarget_files
+from getup_jax.motion.clips import Clip, GetUp, MotionError
+from getup_jax.motion.getups import cut_getup, find_getups
+from getup_jax.motion.readers import ReadOptions, motion_files
+from getup_jax.motion.retarget import RetargetReport, RetargetSettings
+from getup_jax.physics.character import CharacterSpec
+
+AUTHORED, DEEPMIMIC = "authored", "deepmimic"
+_SEED = 0  # of the noise on authored poses
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class MotionLibrary:
+    """What the motion part hands to training."""
+
+    getups: tuple[GetUp, ...]
+    poses: np.ndarray  # [N, 7 + J], mirror images included
+    report: dict[str, RetargetReport]  # file -> how well it was retargeted
+
+    def getup(self, name: str) -> GetUp:
+        """The get-up of that name; an unknown name lists the right ones."""
+        return _named(self.getups, name)
+
+
+def load_motions(
+    config: MotionConfig,
+    character: CharacterSpec,
+    done: Callable[[Path], None] = lambda path: None,
+) -> MotionLibrary:
+    """Read, retarget (or take from the cache) and cut everything in `motion.source`.
+
+    `done` is called after each file. Raises MotionError where a source or a curve is missing.
+    """
+    authored = AUTHORED in config.source
+    getups, poses = _authored(config, character) if authored else ([], [])
+    files = [file for source in config.source if source != AUTHORED for file in _files(source)]
+    clips, report = _clips(files, character, done)
+    getups += _getups_of(clips, config.curves, character)
+    chosen = _choose(getups, config.curves)
+    poses += [clip.qpos for clip in clips]
+    if not poses:
+        raise MotionError(f"motion.source: {list(config.source)} holds no motion")
+    stacked = np.concatenate(poses)
+    if config.mirror:
+        stacked = np.concatenate([stacked, character.mirror(stacked)])
+    return MotionLibrary(tuple(chosen), stacked, report)
+
+
+def deepmimic_folder() -> Path:
+    """The motions that the `pybullet` wheel carries (DeepMimic's, MIT licence)."""
+    spec = importlib.util.find_spec("pybullet_data")
+    if spec is None or spec.origin is None:
+        raise MotionError(
+            "motion.source: deepmimic: its motions come with pybullet; pip install pybullet, "
+            "or give the folder that holds humanoid3d_getup_*.txt"
+        )
+    return Path(spec.origin).parent / "data" / "motions"
+
+
+def _files(source: str) -> list[Path]:
+    path = deepmimic_folder() if source == DEEPMIMIC else Path(source).expanduser()
+    if path.is_dir():
+        files = motion_files(path)
+        if not files:
+            raise MotionError(f"motion.source: {path}: no motion files in this folder")
+        return files
+    if not path.is_file():
+        raise MotionError(
+            f"motion.source: {source!r}: expected '{AUTHORED}', '{DEEPMIMIC}', a folder or a "
+            "file, and there is none of that name"
+        )
+    return [path]
+
+
+def _clips(
+    files: Sequence[Path], character: CharacterSpec, done: Callable[[Path], None]
+) -> tuple[list[Clip], dict[str, RetargetReport]]:
+    """Every file's clip; short files are taken, as their warning says."""
+    read = ReadOptions(allow_short=True)
+    jobs = [
+        Job(file, character, read, RetargetSettings()) for file in files if file.suffix != ".npz"
+    ]
+    fresh = dict(zip([job.path for job in jobs], retarget_files(jobs, cpus(), done), strict=True))
+    clips, report = [], {}
+    for file in files:
+        result = fresh[file] if file in fresh else read_npz(file, character)
+        if isinstance(result, MotionError):
+            raise result
+        clips.append(result[0])
+        report[str(file)] = result[1]
+    return clips, report
+
+
+def cpus() -> int:
+    """How many files to retarget at once."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _authored(
+    config: MotionConfig, character: CharacterSpec
+) -> tuple[list[GetUp], list[np.ndarray]]:
+    from getup_jax.motion.keyframes import authored_poses, load_authored
+
+    getups = load_authored(character)
+    noise, count = config.augment_noise_rad, config.augment
+    return getups, [authored_poses(getups, character, count, noise, _SEED)]
+
+
+def _getups_of(
+    clips: Sequence[Clip], wanted: Sequence[str], character: CharacterSpec
+) -> list[GetUp]:
+    """Explicit cuts `clip:start-stand` of each clip, and what is found in the others."""
+    getups = []
+    for clip in clips:
+        cuts = [cut for cut in map(_cut, wanted) if cut and cut[0] == clip.name]
+        getups += [cut_getup(clip, character, start, stand) for _, start, stand in cuts]
+        if not cuts:
+            getups += find_getups(clip, character)[1]
+    return getups
+
+
+def _cut(name: str) -> tuple[str, int, int] | None:
+    """(clip, start, stand) of `clip:start-stand`, else None."""
+    clip, colon, frames = name.rpartition(":")
+    first, dash, last = frames.partition("-")
+    if colon and dash and first.isdecimal() and last.isdecimal():
+        return clip, int(first), int(last)
+    return None
+
+
+def _choose(getups: Sequence[GetUp], wanted: Sequence[str]) -> list[GetUp]:
+    """The get-ups named in `motion.curves` in that order; a clip's name takes all of its."""
+    if not wanted:
+        return list(getups)
+    chosen: list[GetUp] = []
+    for name in wanted:
+        of_clip = [g for g in getups if _cut(g.name) and g.name.rpartition(":")[0] == name]
+        chosen += of_clip or [_named(getups, name)]
+    return chosen
+
+
+def _named(getups: Sequence[GetUp], name: str) -> GetUp:
+    for getup in getups:
+        if getup.name == name:
+            return getup
+    known = ", ".join(getup.name for getup in getups) or "none"
+    raise MotionError(f"motion.curves: no get-up {name!r}; found: {known}")
