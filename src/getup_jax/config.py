@@ -40,7 +40,8 @@ class PhysicsConfig:
         solvers = ("auto", "newton", "cg", "pgs")
         _require(self.solver in solvers, "physics.solver", f"one of {solvers}", self.solver)
         mjx_pgs = self.engine.startswith("mjx") and self.solver == "pgs"
-        _require(not mjx_pgs, "physics.solver", "auto, newton or cg, since MJX has no PGS", self.solver)
+        expected = "auto, newton or cg, since MJX has no PGS"
+        _require(not mjx_pgs, "physics.solver", expected, self.solver)
         for name in ("control_hz", "substeps", "iterations", "gain_scale", "torque_scale"):
             _require(getattr(self, name) > 0, f"physics.{name}", "more than 0", getattr(self, name))
         _require(self.armature >= 0, "physics.armature", "at least 0", self.armature)

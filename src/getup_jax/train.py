@@ -16,6 +16,7 @@ from getup_jax.metrics import MetricsWriter, tensorboard_module
 from getup_jax.progress import Display, count, duration
 from getup_jax.runfolder import prepare, resume_command
 from getup_jax.stop import StopRequest
+from getup_jax.tasks.build import build_task
 
 __all__ = ["Job", "TrainingError", "build_job", "run"]
 

@@ -111,8 +111,9 @@ def test_truncation_bootstraps_and_termination_does_not(run: Run):
     assert_allclose(_values(run, truncated), 1.0 / (1.0 - 0.8), rtol=0.05)
     assert float(metrics["episode/terminated_share"]) == 0.0
     terminated, metrics = run.train(make_world(length=4, constant=1.0))
-    best = 1.0 + 0.8 + 0.8**2 + 0.8**3
-    assert _values(run, terminated).max() < best
+    # The step's number is hidden, so the value is the mean return over the four steps.
+    returns = np.cumsum(0.8 ** np.arange(4))
+    assert_allclose(_values(run, terminated), returns.mean(), rtol=0.07)
     assert float(metrics["episode/terminated_share"]) == 1.0
 
 

@@ -1,0 +1,173 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+import types
+import warnings
+from pathlib import Path
+
+import pytest
+
+from getup_jax import cli, settings
+from getup_jax.config import ConfigError
+from getup_jax.paths import config_path
+
+
+@pytest.fixture
+def calls(tmp_path, monkeypatch):
+    """The calls of a train.run that does nothing, from an empty folder."""
+    made = []
+
+    def run(*arguments):
+        made.append(arguments)
+        return run.result
+
+    run.result = None
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "getup_jax.train", types.SimpleNamespace(run=run))
+    made_by = types.SimpleNamespace(made=made, run=run)
+    return made_by
+
+
+def test_train_gets_settings_and_the_default_run_folder(calls, capsys):
+    assert cli.train_main(["configs/quick.yaml", "seed=4"]) == 0
+    expected = settings.load_config("quick", ["seed=4"])
+    assert calls.made == [(expected, Path("runs/quick"), False, False)]
+    assert "configs/quick.yaml into runs/quick" in capsys.readouterr().out
+
+
+def test_train_takes_options_between_overrides(calls, capsys):
+    arguments = ["quick", "seed=4", "--run", "mine", "--resume", "ppo.epochs=2", "--quiet"]
+    assert cli.train_main(arguments) == 0
+    ((config, *rest),) = calls.made
+    assert (config.seed, config.ppo.epochs, rest) == (4, 2, [Path("mine"), True, True])
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize(("number", "code"), [(None, 0), (2, 130), (15, 143)])
+def test_the_exit_code_tells_of_a_signal(calls, number, code):
+    calls.run.result = number
+    assert cli.train_main(["quick"]) == code
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["quick", "ppo.learnig_rate=1"], "ConfigError: ppo.learnig_rate: unknown key; did you mean"),
+        (["nothing.yaml"], "ConfigError: nothing.yaml: no such config file; the shipped configs"),
+        (["quick", "--run", "full"], "RunError: full: holds a run already; add --resume"),
+        (["quick", "--run", "full/file"], "RunError: full/file: is a file"),
+    ],
+)
+def test_errors_of_users_are_one_clean_line(calls, capsys, arguments, message):
+    Path("full").mkdir()
+    Path("full/file").write_text("")
+    assert cli.train_main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith(message)
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""
+    assert calls.made == []
+
+
+def test_a_full_folder_can_be_resumed(calls):
+    Path("runs/quick").mkdir(parents=True)
+    Path("runs/quick/config.yaml").write_text("")
+    assert cli.train_main(["quick", "--resume"]) == 0
+
+
+def test_errors_of_ours_keep_their_traceback(calls, monkeypatch):
+    def fail(*_):
+        raise ValueError("a shape does not fit")
+
+    monkeypatch.setattr(sys.modules["getup_jax.train"], "run", fail)
+    with pytest.raises(ValueError, match="a shape"):
+        cli.train_main(["quick"])
+
+
+def test_warnings_are_one_clean_line(calls, capsys, monkeypatch):
+    def warn(*_):
+        warnings.warn("going back to 00000003", RuntimeWarning, stacklevel=2)
+
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    monkeypatch.setattr(sys.modules["getup_jax.train"], "run", warn)
+    assert cli.train_main(["quick"]) == 0
+    # pytest records warnings itself, so the printer is called as Python would.
+    warnings.showwarning("going back to 00000003", RuntimeWarning, "file.py", 3)
+    assert "warning: going back to 00000003\n" in capsys.readouterr().err
+
+
+EARLY = """
+import sys
+from getup_jax.cli import train_main
+code = train_main(["quick", "ppo.learnig_rate=1"])
+heavy = {"jax", "flax", "orbax", "mujoco", "numpy"} & set(sys.modules)
+sys.exit(code if not heavy else f"imported {heavy}")
+"""
+
+
+def test_a_wrong_setting_is_answered_before_anything_heavy_is_imported():
+    done = subprocess.run([sys.executable, "-c", EARLY], capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_eval_passes_its_arguments_on(monkeypatch):
+    seen = []
+    module = types.SimpleNamespace(evaluate_command=seen.append)
+    monkeypatch.setitem(sys.modules, "getup_jax.evaluate", module)
+    assert cli.eval_main([]) == 0
+    options = ["--ckpt", "runs/a", "--episodes", "7", "--seed", "3", "--json", "a.json"]
+    assert cli.eval_main([*options, "--video", "a.mp4", "--engine", "mjx"]) == 0
+    default = {"ckpt": "flat", "episodes": 100, "seed": 0}
+    default |= dict.fromkeys(["json", "video", "engine"])
+    assert vars(seen[0]) == default
+    assert vars(seen[1]) == {
+        "ckpt": "runs/a",
+        "episodes": 7,
+        "seed": 3,
+        "json": Path("a.json"),
+        "video": Path("a.mp4"),
+        "engine": "mjx",
+    }
+
+
+def test_eval_errors_are_clean(monkeypatch, capsys):
+    def fail(_):
+        raise ConfigError("physics.engine: expected one of ...")
+
+    module = types.SimpleNamespace(evaluate_command=fail)
+    monkeypatch.setitem(sys.modules, "getup_jax.evaluate", module)
+    assert cli.eval_main([]) == 2
+    assert capsys.readouterr().err == "ConfigError: physics.engine: expected one of ...\n"
+
+
+@pytest.mark.parametrize("number", ["0", "-3", "x"])
+def test_eval_wants_at_least_one_episode(number, capsys):
+    with pytest.raises(SystemExit) as caught:
+        cli.eval_main(["--episodes", number])
+    assert caught.value.code == 2
+    assert "--episodes" in capsys.readouterr().err
+
+
+def test_motion_passes_its_arguments_on(monkeypatch):
+    seen = []
+    module = types.SimpleNamespace(main=seen.append)
+    monkeypatch.setitem(sys.modules, "getup_jax.motion.command", module)
+    assert cli.motion_main(["list", "x"]) == 0
+    assert seen == [["list", "x"]]
+
+
+@pytest.mark.parametrize("main", [cli.train_main, cli.eval_main])
+def test_help_shows_examples(main, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["--help"])
+    assert caught.value.code == 0
+    assert "examples:" in capsys.readouterr().out
+
+
+def test_the_help_names_a_config_that_exists(capsys):
+    with pytest.raises(SystemExit):
+        cli.train_main(["--help"])
+    assert "getup-train configs/flat.yaml" in capsys.readouterr().out
+    assert config_path("configs/flat.yaml").is_file()
