@@ -201,6 +201,15 @@ def test_a_folder_that_holds_something_is_not_overwritten(tmp_path):
     jax.tree.map(np.testing.assert_array_equal, arrays(tmp_path), before)
 
 
+def test_a_run_that_failed_before_its_first_iteration_can_be_started_again(tmp_path):
+    def fail(*_):
+        raise OSError("no motions")
+
+    with pytest.raises(OSError, match="no motions"):
+        run(settings(1), tmp_path, quiet=True, build=fail)
+    train(tmp_path, 1)
+
+
 def test_resume_without_a_checkpoint_starts_from_the_beginning(tmp_path, unbroken):
     (tmp_path / "metrics.jsonl").write_text('{"iteration": 1, "steps": 8, "wall_s": 1}\n')
     train(tmp_path, 2, resume=True)

@@ -55,8 +55,8 @@ class MotionConfig:
     source: tuple[str, ...] = ("authored",)  # `authored`, `deepmimic`, folders or files
     curves: tuple[str, ...] = ()  # names of the get-ups to train on; empty: all that are found
     mirror: bool = True  # double the pose data by mirroring
-    augment: int = 4  # noisy copies of each authored pose for the pose prior
-    augment_noise_rad: float = 0.05  # standard deviation of that joint noise
+    augment_poses: int = 20_000  # poses that the authored motions are varied into for the prior
+    augment_noise_rad: float = 0.05  # standard deviation of the joint noise in them
 
 
 @dataclasses.dataclass(frozen=True)

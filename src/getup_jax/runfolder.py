@@ -19,10 +19,13 @@ class RunError(ValueError):
 
 
 def check(folder: Path, resume: bool) -> None:
-    """Raise RunError if the folder holds something and the run is not to be resumed."""
+    """Raise RunError if the folder holds something and the run is not to be resumed.
+
+    Settings alone are nothing to lose: a run that failed before its first iteration left them.
+    """
     if folder.exists() and not folder.is_dir():
         raise RunError(f"{folder}: is a file; choose another folder with --run FOLDER")
-    if not resume and folder.is_dir() and any(folder.iterdir()):
+    if not resume and folder.is_dir() and any(path.name != CONFIG for path in folder.iterdir()):
         hint = "add --resume to continue it, or choose another folder with --run FOLDER"
         raise RunError(f"{folder}: holds a run already; {hint}")
 
@@ -32,7 +35,7 @@ def prepare(folder: Path, config: Config, resume: bool, log: Callable[[str], Non
     check(folder, resume)
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / CONFIG
-    if file.exists():
+    if resume and file.exists():
         _log_changes(file, config, log)
     fresh = file.with_suffix(".new")
     fresh.write_text(dump_yaml(config), encoding="utf-8")

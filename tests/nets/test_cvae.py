@@ -1,3 +1,5 @@
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +18,7 @@ def arrays(rows: int = ROWS) -> tuple[jax.Array, jax.Array]:
     return jnp.asarray(angles, jnp.float32), jnp.asarray(condition, jnp.float32)
 
 
+@functools.cache
 def make(conditional: bool = True):
     model = CVAE(JOINTS, LATENT, (16, 16), conditional)
     return model, init_variables(model, jax.random.key(0), *arrays())

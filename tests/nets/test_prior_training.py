@@ -8,13 +8,18 @@ from pose_samples import QUICK, character, manifold_poses, pose_set, quick_prior
 from getup_jax.nets import prior as pose_prior
 from getup_jax.nets import prior_cache, prior_report
 from getup_jax.nets.prior_data import BLOCK, PoseSet, blocks, make_pose_set, pose_conditions, split
-from getup_jax.nets.prior_training import limit_check, pca_variance, train_prior
+from getup_jax.nets.prior_training import (
+    PROGRESS_CALLS,
+    limit_check,
+    pca_variance,
+    train_prior,
+)
 
 BRIEF = dataclasses.replace(QUICK, min_updates=30)
 
 
-def small_set(rows: int = 300) -> PoseSet:
-    return make_pose_set(manifold_poses(rows), character())
+def small_set() -> PoseSet:
+    return make_pose_set(manifold_poses(60), character())
 
 
 # --- poses and what is held out
@@ -43,9 +48,10 @@ def test_mirror_images_have_the_mirrored_features_and_the_same_group():
 
 
 def test_blocks_are_contiguous_and_short_sets_are_cut_finer():
-    assert list(blocks(95)[[0, BLOCK - 1, BLOCK, 94]]) == [0, 0, 1, 3] or BLOCK != 30
-    assert len(np.unique(blocks(3000))) == 3000 // BLOCK
-    assert len(np.unique(blocks(20))) >= 10
+    long = blocks(100 * BLOCK)
+    np.testing.assert_array_equal(long, np.repeat(np.arange(100), BLOCK))
+    np.testing.assert_array_equal(blocks(20), np.repeat(np.arange(10), 2))
+    np.testing.assert_array_equal(blocks(5), np.arange(5))
 
 
 def test_split_divides_all_rows_and_keeps_groups_whole():
@@ -69,8 +75,8 @@ def test_bad_poses_are_named():
     poses[17, 9] = np.nan
     with pytest.raises(ValueError, match="row 17"):
         make_pose_set(poses, character())
-    good = small_set(40)
-    with pytest.raises(ValueError, match=r"condition: expected shape \(40, 3\), got \(39, 3\)"):
+    good = small_set()
+    with pytest.raises(ValueError, match=r"condition: expected shape \(60, 3\), got \(59, 3\)"):
         dataclasses.replace(good, condition=good.condition[1:])
 
 
@@ -80,7 +86,7 @@ def test_bad_poses_are_named():
 def test_a_two_dimensional_manifold_is_learned():
     _, report = quick_prior()
     assert report.heldout_rmse_deg < 3.0
-    assert report.train_rmse_deg <= report.heldout_rmse_deg
+    assert report.heldout_rmse_deg == pytest.approx(report.train_rmse_deg, rel=0.5)
     spread = np.degrees(np.sqrt(np.mean(pose_set().angles.var(axis=0))))
     assert spread > 20  # degrees: what predicting the mean pose would be off
 
@@ -96,21 +102,22 @@ def test_the_standard_vae_is_trained_too():
     )
 
 
-def test_small_sets_get_more_epochs_and_progress_ends_with_the_last():
+def test_small_sets_get_more_epochs_until_enough_updates():
+    _, report = quick_prior()
+    per_epoch = report.num_poses // QUICK.batch_size
+    assert report.epochs == -(-QUICK.min_updates // per_epoch)
+    assert report.updates == report.epochs * per_epoch
+
+
+def test_fewer_poses_than_a_batch_are_one_batch():
     calls = []
     _, report = train_prior(small_set(), BRIEF, lambda *call: calls.append(call))
-    assert report.num_poses + report.num_heldout == 300
-    per_epoch = report.num_poses // BRIEF.batch_size
-    assert report.epochs == -(-BRIEF.min_updates // per_epoch)
-    assert report.updates == report.epochs * per_epoch
+    assert report.num_poses + report.num_heldout == 60 < BRIEF.batch_size
+    assert report.updates == report.epochs == BRIEF.min_updates
+    assert np.isfinite(report.heldout_rmse_deg)
+    assert len(calls) <= PROGRESS_CALLS
     assert calls[-1][:2] == (report.epochs, report.epochs)
     assert set(calls[-1][2]) == {"reconstruction", "kl"}
-
-
-def test_fewer_poses_than_a_batch():
-    _, report = train_prior(small_set(40), dataclasses.replace(BRIEF, epochs=3, min_updates=1))
-    assert report.updates == 3
-    assert np.isfinite(report.heldout_rmse_deg)
 
 
 def test_the_same_arguments_give_the_same_prior():
@@ -154,7 +161,7 @@ def test_a_cached_prior_is_read_and_not_trained_again(tmp_path, monkeypatch):
 @pytest.mark.parametrize("damage", ["cut", "empty", "gone"])
 def test_a_damaged_cache_is_made_again(tmp_path, suffix, damage):
     config = dataclasses.replace(BRIEF, min_updates=1)
-    prior, _ = prior_cache.cached_prior(small_set(60), config, tmp_path, lambda _: None)
+    prior, _ = prior_cache.cached_prior(small_set(), config, tmp_path, lambda _: None)
     (file,) = tmp_path.glob(f"*{suffix}")
     whole = file.read_bytes()
     if damage == "gone":
@@ -162,17 +169,17 @@ def test_a_damaged_cache_is_made_again(tmp_path, suffix, damage):
     else:
         file.write_bytes(whole[: len(whole) // 2] if damage == "cut" else b"")
     lines = []
-    again, _ = prior_cache.cached_prior(small_set(60), config, tmp_path, lines.append)
+    again, _ = prior_cache.cached_prior(small_set(), config, tmp_path, lines.append)
     np.testing.assert_array_equal(prior.latent_mean, again.latent_mean)
     if (suffix, damage) != (".npz", "gone"):
         assert "damaged" in lines[0]
     lines.clear()
-    prior_cache.cached_prior(small_set(60), config, tmp_path, lines.append)
+    prior_cache.cached_prior(small_set(), config, tmp_path, lines.append)
     assert lines == []
 
 
 def test_other_poses_or_settings_are_another_prior():
-    poses = small_set(60)
+    poses = small_set()
     prints = {
         prior_cache.fingerprint(poses, BRIEF),
         prior_cache.fingerprint(poses, dataclasses.replace(BRIEF, seed=1)),
@@ -180,7 +187,7 @@ def test_other_poses_or_settings_are_another_prior():
         prior_cache.fingerprint(dataclasses.replace(poses, group=poses.group[::-1]), BRIEF),
     }
     assert len(prints) == 4
-    assert prior_cache.fingerprint(small_set(60), BRIEF) in prints
+    assert prior_cache.fingerprint(small_set(), BRIEF) in prints
 
 
 # --- what the prior does to bodies

@@ -21,13 +21,13 @@ from getup_jax.physics.character import CharacterSpec
 class EventSettings:
     """Heights are shares of the link's height in the neutral pose; times in seconds."""
 
-    lie_head: float = 0.31  # lying: head below this ...
-    lie_pelvis: float = 0.31  # ... and pelvis below this
+    lie_head: float = 0.32  # lying: head below this ...
+    lie_pelvis: float = 0.33  # ... and pelvis below this
     flat_head: float = 0.185  # flat on the floor, likewise
     flat_pelvis: float = 0.22
     stand_head: float = 0.81  # standing: head above this ...
-    stand_pelvis: float = 0.82  # ... and pelvis above this
-    gap_s: float = 1.0  # a shorter break does not end a lying phase
+    stand_pelvis: float = 0.87  # ... and pelvis above this
+    gap_s: float = 2.0  # a shorter break does not end a lying phase
     min_lie_s: float = 0.1  # a shorter lying phase is none
     max_rise_s: float = 12.0  # a slower rise is not one get-up
     side_cosine: float = 0.5  # |cosine of front to up| below this: lying on the side

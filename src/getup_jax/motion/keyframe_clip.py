@@ -7,7 +7,7 @@ from scipy.interpolate import PchipInterpolator
 
 from getup_jax.motion.clips import Clip
 from getup_jax.motion.keyframe_file import Keyframe, KeyframeMotion
-from getup_jax.motion.planting import Planter, held_contacts
+from getup_jax.motion.planting import Planter
 from getup_jax.physics.character import CharacterSpec
 
 
@@ -48,9 +48,9 @@ def _continuous_signs(quaternions: np.ndarray) -> np.ndarray:
 def _plant(
     qpos: np.ndarray, times: np.ndarray, keys: tuple[Keyframe, Keyframe], planter: Planter
 ) -> np.ndarray:
-    """Hold the contacts that both keyframes plant; the small difference between them is spread."""
+    """Hold the contacts that the first keyframe plants; what the second misses by is spread."""
     first, second = keys
-    names = held_contacts(first.planted, second.planted)
+    names = first.planted
     if not names:
         return qpos
     start, end = (planter.poses(key.qpos, names) for key in keys)

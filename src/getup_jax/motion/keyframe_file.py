@@ -7,7 +7,7 @@
         note: lying on the back
         position: [0.0, 0.0, 0.1]          # m, pelvis
         rotation: [0.0, -90.0, 0.0]        # degrees, rotation vector of the pelvis
-        planted: [foot_r]                  # contacts that stay put until they are dropped
+        planted: [foot_r]                  # contacts that stay put until the next keyframe
         angles: {arm_l: [0, 28, 10], shin_l: -4}   # degrees: flexion, abduction, twist
 
 A link that a keyframe does not name keeps the angles of the keyframe before; the first one
@@ -42,7 +42,7 @@ class Keyframe:
 
     time: float  # s
     qpos: np.ndarray  # [7 + J]
-    planted: tuple[str, ...]  # names of planting.CONTACTS
+    planted: tuple[str, ...]  # planting.CONTACTS that stay put until the next one
     note: str = ""
 
 

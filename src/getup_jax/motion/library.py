@@ -117,7 +117,7 @@ def _authored(
     from getup_jax.motion.keyframes import authored_poses, load_authored
 
     getups = load_authored(character)
-    noise, count = config.augment_noise_rad, config.augment
+    noise, count = config.augment_noise_rad, config.augment_poses
     return getups, [authored_poses(getups, character, count, noise, _SEED)]
 
 

@@ -39,25 +39,10 @@ CONTACTS: dict[str, Contact] = {
         ("elbow", "forearm", (0.0, 0.0, 0.0), True),
     )
 }
-# A flat foot that rolls onto its toes keeps them where they were.
-_IMPLIED = {
-    f"{whole}_{side}": tuple(f"{part}_{side}" for part in parts)
-    for side in _SIDES
-    for whole, parts in (("foot", ("toes", "heel")), ("shin", ("knee",)))
-}
 _TURN_WEIGHT = 0.3  # m/rad, orientation errors against position errors
 _ITERATIONS = 5
 _TOLERANCE_M = 2e-4
 _DAMPING = 1e-3
-
-
-def held_contacts(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
-    """The contacts that stay put between two keyframes."""
-    whole = set(first) & set(second)
-    parts = {p for name in first for p in (name, *_IMPLIED.get(name, ()))}
-    parts &= {p for name in second for p in (name, *_IMPLIED.get(name, ()))}
-    redundant = {p for name in whole for p in _IMPLIED.get(name, ())}
-    return tuple(sorted(parts - redundant))
 
 
 class Planter:

@@ -14,12 +14,27 @@ import jax
 import jax.numpy as jnp
 from flax import linen as nn
 
-from getup_jax.nets.mlp import MLP
+from getup_jax.nets.mlp import OUTPUT_LAYER
 
 CONDITION_SIZE = 3  # height (m), side and front angle (rad)
 
 # In rad and m. A hinge that hardly moves in the data must not be blown up to unit variance.
 MIN_STD = 0.02
+
+
+class TanhNetwork(nn.Module):
+    """Dense layers with tanh between them and Glorot's kernels: [..., I] to [..., output_size]."""
+
+    hidden_sizes: tuple[int, ...]
+    output_size: int
+
+    @nn.compact
+    def __call__(self, x: jax.Array) -> jax.Array:
+        """The outputs [..., output_size] for inputs x[..., I]; no tanh after the last layer."""
+        init = nn.initializers.glorot_uniform()
+        for index, size in enumerate(self.hidden_sizes):
+            x = nn.tanh(nn.Dense(size, kernel_init=init, name=f"hidden_{index}")(x))
+        return nn.Dense(self.output_size, kernel_init=init, name=OUTPUT_LAYER)(x)
 
 
 class CVAE(nn.Module):
@@ -35,8 +50,8 @@ class CVAE(nn.Module):
 
     def setup(self) -> None:
         """Both perceptrons, and the statistics [J] and [3] that travel with the parameters."""
-        self.encoder = MLP(self.hidden_sizes, 2 * self.latent_size, "tanh")
-        self.decoder = MLP(self.hidden_sizes, self.num_joints, "tanh")
+        self.encoder = TanhNetwork(self.hidden_sizes, 2 * self.latent_size)
+        self.decoder = TanhNetwork(self.hidden_sizes, self.num_joints)
         self.angle_mean = self.variable("statistics", "angle_mean", jnp.zeros, self.num_joints)
         self.angle_std = self.variable("statistics", "angle_std", jnp.ones, self.num_joints)
         self.condition_mean = self.variable(
@@ -74,8 +89,8 @@ def init_variables(
     model: CVAE, key: jax.Array, angles: jax.Array, condition: jax.Array
 ) -> dict[str, Any]:
     """Fresh parameters, with the statistics of training angles [N, J] and conditions [N, 3]."""
-    noise = jnp.zeros((1, model.latent_size))
-    variables = model.init(key, angles[:1], condition[:1], noise)
+    inputs = (angles[:1], condition[:1], jnp.zeros((1, model.latent_size)))
+    variables = jax.jit(model.init)(key, *inputs)
     statistics = {
         "angle_mean": jnp.mean(angles, axis=0),
         "angle_std": jnp.maximum(jnp.std(angles, axis=0), MIN_STD),
@@ -99,7 +114,7 @@ def loss_terms(
     variables: dict[str, Any],
     batch: tuple[jax.Array, jax.Array],
     noise: jax.Array,
-    beta: float,
+    beta: jax.Array | float,
 ) -> dict[str, jax.Array]:
     """The terms of the loss [] of a batch (angles [N, J], condition [N, 3]); it is their sum.
 

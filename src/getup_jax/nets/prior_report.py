@@ -65,9 +65,7 @@ def evaluate_prior(
     """
     condition = pose_conditions(poses, character)
     angles, c = jnp.asarray(poses[:, 7:], jnp.float32), jnp.asarray(condition)
-    decoded = pose_prior.decode(prior, pose_prior.encode(prior, angles, c), c)
-    action = jax.random.normal(jax.random.key(seed), (len(poses), prior.latent_size))
-    random = pose_prior.decode_action(prior, action, c)
+    decoded, random = _decoded(prior, angles, c, jax.random.key(seed))
     return PriorEvaluation(
         num_poses=len(poses),
         rmse_deg=rmse_deg(prior, angles, c),
@@ -78,6 +76,17 @@ def evaluate_prior(
         decoded_penetration=self_penetration(decoded, character),
         random_penetration=self_penetration(random, character),
     )
+
+
+@jax.jit
+def _decoded(
+    prior: PosePrior, angles: jax.Array, condition: jax.Array, key: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Joint angles [N, J] of the poses' own latents, and of random ones, under [N, 3]."""
+    action = jax.random.normal(key, (len(angles), prior.latent_size))
+    latent = pose_prior.encode(prior, angles, condition)
+    random = pose_prior.decode_action(prior, action, condition)
+    return pose_prior.decode(prior, latent, condition), random
 
 
 def feature_error(

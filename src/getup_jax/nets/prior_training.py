@@ -6,6 +6,7 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
@@ -50,11 +51,26 @@ class PriorReport:
 
 
 @struct.dataclass
+class Recipe:
+    """How to train: what an epoch needs beside state and data."""
+
+    model: CVAE = struct.field(pytree_node=False)
+    batch_size: int = struct.field(pytree_node=False)
+    learning_rate: jax.Array  # []
+    beta: jax.Array  # []
+
+    @property
+    def optimiser(self) -> optax.GradientTransformation:
+        """Adam with a constant rate."""
+        return optax.adam(self.learning_rate)
+
+
+@struct.dataclass
 class FitState:
     """What one epoch hands to the next."""
 
-    params: Any
-    optimiser: Any  # optax state
+    variables: dict[str, Any]  # of the CVAE; its statistics never change
+    moments: Any  # optax state
     key: jax.Array  # never changes: epochs fold their number into it
 
 
@@ -72,7 +88,7 @@ def train_prior(
     num_joints = poses.angles.shape[1]
     model = CVAE(num_joints, config.latent_size, config.hidden_sizes, config.conditional)
     variables, epochs, updates = _fit(model, train, config, progress)
-    mean, _ = model.apply(variables, *train, method="encode")
+    mean, _ = jax.jit(partial(model.apply, method="encode"))(variables, *train)
     prior = PosePrior(
         variables=variables,
         latent_mean=jnp.mean(mean, axis=0),
@@ -80,7 +96,7 @@ def train_prior(
         joint_lower=jnp.asarray(poses.joint_lower),
         joint_upper=jnp.asarray(poses.joint_upper),
     )
-    random = decode_random(prior, poses.condition, NUM_RANDOM_LATENTS, config.seed)
+    random = decode_random(prior, jnp.asarray(poses.condition), jax.random.key(config.seed))
     report = PriorReport(
         num_poses=len(train[0]),
         num_heldout=len(heldout[0]),
@@ -89,7 +105,7 @@ def train_prior(
         seconds=time.perf_counter() - start,
         train_rmse_deg=rmse_deg(prior, *train),
         heldout_rmse_deg=rmse_deg(prior, *heldout),
-        mean_kl=float(jnp.mean(kl_to_standard_normal(*pose_prior.posterior(prior, *heldout)))),
+        mean_kl=float(_mean_kl(prior, *heldout)),
         active_latents=int(jnp.sum(prior.latent_std > MIN_LATENT_STD)),
         pca_variance=pca_variance(np.asarray(train[0]), config.latent_size),
         **limit_check(prior, random),
@@ -97,35 +113,48 @@ def train_prior(
     return prior, report
 
 
-def decode_random(prior: PosePrior, condition: np.ndarray, count: int, seed: int) -> jax.Array:
+@partial(jax.jit, static_argnames="count")
+def decode_random(
+    prior: PosePrior, condition: jax.Array, key: jax.Array, count: int = NUM_RANDOM_LATENTS
+) -> jax.Array:
     """Decoded latents z ~ N(latent_mean, latent_std) under drawn conditions, [count, J] rad."""
-    key_latent, key_condition = jax.random.split(jax.random.key(seed))
-    action = jax.random.normal(key_latent, (count, prior.latent_size))
-    rows = jax.random.randint(key_condition, (count,), 0, len(condition))
-    return pose_prior.decode_action(prior, action, jnp.asarray(condition)[rows])
+    key_action, key_row = jax.random.split(key)
+    action = jax.random.normal(key_action, (count, prior.latent_size))
+    row = jax.random.randint(key_row, (count,), 0, len(condition))
+    return pose_prior.decode_action(prior, action, condition[row])
 
 
 def limit_check(prior: PosePrior, angles: jax.Array) -> dict[str, float]:
     """How far angles [N, J] (rad) leave the joint limits; see the fields of PriorReport."""
-    excess = jnp.maximum(prior.joint_lower - angles, angles - prior.joint_upper)
+    excess = np.maximum(prior.joint_lower - angles, angles - prior.joint_upper)
     outside = excess > LIMIT_TOLERANCE
     return {
-        "random_angles_outside": float(jnp.mean(outside)),
-        "random_poses_outside": float(jnp.mean(jnp.any(outside, axis=-1))),
-        "random_worst_deg": math.degrees(float(jnp.maximum(jnp.max(excess), 0.0))),
+        "random_angles_outside": float(outside.mean()),
+        "random_poses_outside": float(outside.any(axis=-1).mean()),
+        "random_worst_deg": math.degrees(max(0.0, float(excess.max()))),
     }
 
 
 def rmse_deg(prior: PosePrior, angles: jax.Array, condition: jax.Array) -> float:
     """Root mean square error of the reconstruction over poses [N] and hinges [J], in degrees."""
-    decoded = pose_prior.decode(prior, pose_prior.encode(prior, angles, condition), condition)
-    return math.degrees(float(jnp.sqrt(jnp.mean(jnp.square(decoded - angles)))))
+    return math.degrees(math.sqrt(_square_error(prior, angles, condition)))
 
 
 def pca_variance(angles: np.ndarray, components: int) -> float:
     """Share of the variance of angles [N, J] that the first principal components cover."""
     eigenvalues = np.linalg.eigvalsh(np.cov(angles, rowvar=False))[::-1]
     return float(eigenvalues[:components].sum() / eigenvalues.sum())
+
+
+@jax.jit
+def _square_error(prior: PosePrior, angles: jax.Array, condition: jax.Array) -> jax.Array:
+    decoded = pose_prior.decode(prior, pose_prior.encode(prior, angles, condition), condition)
+    return jnp.mean(jnp.square(decoded - angles))
+
+
+@jax.jit
+def _mean_kl(prior: PosePrior, angles: jax.Array, condition: jax.Array) -> jax.Array:
+    return jnp.mean(kl_to_standard_normal(*pose_prior.posterior(prior, angles, condition)))
 
 
 def _arrays(poses: PoseSet, rows: np.ndarray) -> tuple[jax.Array, jax.Array]:
@@ -140,56 +169,52 @@ def _fit(
 ) -> tuple[dict[str, Any], int, int]:
     """Trained variables, the number of epochs and of updates."""
     key_init, key_epochs = jax.random.split(jax.random.key(config.seed))
+    size = min(config.batch_size, len(data[0]))
+    recipe = Recipe(model, size, jnp.float32(config.learning_rate), jnp.float32(config.beta))
     variables = init_variables(model, key_init, *data)
-    optimiser = optax.adam(config.learning_rate)
-    params = variables["params"]
-    state = FitState(params=params, optimiser=optimiser.init(params), key=key_epochs)
-    run_epoch = _make_epoch(model, optimiser, config)
-    updates = max(1, len(data[0]) // config.batch_size)
+    state = FitState(variables, recipe.optimiser.init(variables["params"]), key_epochs)
+    updates = len(data[0]) // size
     epochs = max(config.epochs, math.ceil(config.min_updates / updates))
     every = math.ceil(epochs / PROGRESS_CALLS)
     for epoch in range(1, epochs + 1):
-        state, terms = run_epoch(state, variables["statistics"], data, epoch)
+        state, terms = _epoch(recipe, state, data, epoch)
         if progress is not None and (epoch % every == 0 or epoch == epochs):
             progress(epoch, epochs, {name: float(value) for name, value in terms.items()})
-    return {**variables, "params": state.params}, epochs, epochs * updates
+    return state.variables, epochs, epochs * updates
 
 
-def _make_epoch(
-    model: CVAE, optimiser: optax.GradientTransformation, config: PriorConfig
-) -> Callable[..., tuple[FitState, dict[str, jax.Array]]]:
-    """A jitted epoch: (state, statistics, data, number) -> (state, mean loss terms)."""
+@jax.jit
+def _epoch(
+    recipe: Recipe, state: FitState, data: tuple[jax.Array, jax.Array], number: jax.Array
+) -> tuple[FitState, dict[str, jax.Array]]:
+    """One pass over shuffled minibatches, and the mean of every loss term."""
+    key_order, key_noise = jax.random.split(jax.random.fold_in(state.key, number))
+    # Rows past the last whole batch wait for another epoch's order.
+    count = len(data[0]) // recipe.batch_size
+    order = jax.random.permutation(key_order, len(data[0]))[: count * recipe.batch_size]
+    order = order.reshape(count, recipe.batch_size)
+    batches = jax.tree.map(lambda x: x[order], data)
+    noise = jax.random.normal(key_noise, (*order.shape, recipe.model.latent_size))
 
-    def loss(params: Any, statistics: Any, batch: Any, noise: jax.Array):
-        variables = {"params": params, "statistics": statistics}
-        terms = loss_terms(model, variables, batch, noise, config.beta)
+    def update(state: FitState, inputs: tuple[Any, jax.Array]):
+        return _update(recipe, state, *inputs)
+
+    state, terms = jax.lax.scan(update, state, (batches, noise))
+    return state, jax.tree.map(jnp.mean, terms)
+
+
+def _update(
+    recipe: Recipe, state: FitState, batch: tuple[jax.Array, jax.Array], noise: jax.Array
+) -> tuple[FitState, dict[str, jax.Array]]:
+    """One step of Adam on one minibatch, and its loss terms."""
+
+    def loss(params: Any):
+        variables = {**state.variables, "params": params}
+        terms = loss_terms(recipe.model, variables, batch, noise, recipe.beta)
         return sum(terms.values()), terms
 
-    @jax.jit
-    def epoch(
-        state: FitState, statistics: Any, data: tuple[jax.Array, jax.Array], number: jax.Array
-    ) -> tuple[FitState, dict[str, jax.Array]]:
-        key_order, key_noise = jax.random.split(jax.random.fold_in(state.key, number))
-        order = _shuffled_batches(key_order, len(data[0]), config.batch_size)
-        batches = jax.tree.map(lambda x: x[order], data)
-        noise = jax.random.normal(key_noise, (*order.shape, model.latent_size))
-
-        def update(carry: tuple[Any, Any], inputs: tuple[Any, jax.Array]):
-            params, moments = carry
-            gradient, terms = jax.grad(loss, has_aux=True)(params, statistics, *inputs)
-            change, moments = optimiser.update(gradient, moments, params)
-            return (optax.apply_updates(params, change), moments), terms
-
-        carry = (state.params, state.optimiser)
-        (params, moments), terms = jax.lax.scan(update, carry, (batches, noise))
-        state = FitState(params=params, optimiser=moments, key=state.key)
-        return state, jax.tree.map(jnp.mean, terms)
-
-    return epoch
-
-
-def _shuffled_batches(key: jax.Array, count: int, size: int) -> jax.Array:
-    """Row indices [batches, min(size, count)]; rows past the last whole batch are left out."""
-    size = min(size, count)
-    order = jax.random.permutation(key, count)
-    return order[: count // size * size].reshape(-1, size)
+    params = state.variables["params"]
+    gradient, terms = jax.grad(loss, has_aux=True)(params)
+    change, moments = recipe.optimiser.update(gradient, state.moments, params)
+    variables = {**state.variables, "params": optax.apply_updates(params, change)}
+    return state.replace(variables=variables, moments=moments), terms

@@ -46,7 +46,7 @@ def build_task(
         raise ConfigError(f"motion.source: no get-ups found in {config.motion.source}")
     log(f"motions: {len(getups)} get-ups, {len(library.poses)} poses")
     if prior is None:
-        poses = make_pose_set(library.poses, character, group=library.groups)
+        poses = make_pose_set(library.poses, character)
         prior, _ = cached_prior(poses, config.prior, cache_dir() / "prior", log)
     return assemble(config, character, getups, prior, log)
 
