@@ -149,7 +149,7 @@ def test_a_journal_tells_divergence_from_no_episode(tmp_path, name, value, diver
 # --- the display
 
 
-METRICS = {"rollout/reward": 0.25, "episode/return_rate": 0.5, "episode/success": math.nan}
+METRICS = {"rollout/reward_total": 0.25, "episode/return_rate": 0.5, "episode/success": math.nan}
 
 
 def test_the_progress_line():

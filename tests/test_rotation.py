@@ -24,8 +24,12 @@ def scipy(q) -> Rotation:
     return Rotation.from_quat(np.asarray(q), scalar_first=True)
 
 
+def about(axis: str, radians) -> Rotation:
+    return Rotation.from_rotvec(np.multiply.outer(radians, np.eye(3)["xyz".index(axis)]))
+
+
 def yaw(radians) -> Rotation:
-    return Rotation.from_euler("z", radians)
+    return about("z", radians)
 
 
 def assert_same_rotation(q, expected: Rotation, atol: float = 1e-5) -> None:
@@ -95,7 +99,7 @@ def test_heading_ignores_a_tilt_about_a_horizontal_axis(posture):
 
 
 def test_a_turn_about_the_vertical_is_added_to_the_heading():
-    for r in RANDOM[:10]:
+    for r in RANDOM[:4]:
         change = yaw(heading_of(yaw(YAWS) * r) - heading_of(r) - YAWS)
         np.testing.assert_allclose(change.magnitude(), 0.0, atol=1e-4)
 
@@ -103,7 +107,7 @@ def test_a_turn_about_the_vertical_is_added_to_the_heading():
 def test_heading_is_continuous_in_a_whole_roll_on_the_floor():
     # rolling from prone over the side to supine and on, about the body's long axis
     roll = np.linspace(0.0, 2 * np.pi, 721)
-    rolled = Rotation.from_euler("x", roll) * PRONE
+    rolled = about("x", roll) * PRONE
     steps = np.diff(np.unwrap(heading_of(rolled)))
     np.testing.assert_allclose(steps, roll[1], atol=1e-4)
 

@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Column
 
-# The figures shown, by what a metric's name ends in: `rollout/reward` and `reward` alike.
-KEY_METRICS = {"reward": "reward", "return_rate": "return rate", "success": "success"}
+# The figures shown: the last part of a metric's name (`rollout/reward_total`), and its label.
+KEY_METRICS = {"reward_total": "reward", "return_rate": "return rate", "success": "success"}
 
 
 class Display:

@@ -181,12 +181,23 @@ def test_the_iteration_number_seeds_its_noise(run: Run):
     world = make_world(by_action=1.0)
     actors = []
     for iteration in (0, 0, 1):
-        state = run.initial(world, jax.random.key(0))
+        state, _ = run.train(world, iterations=1)  # the first one only collects statistics
         state = dataclasses.replace(state, iteration=jnp.int32(iteration))
         state, _ = run.iteration(world, state)
         actors.append(np.asarray(state.learner.policy.actor["params"]["output"]["kernel"]))
     assert_array_equal(actors[0], actors[1])
     assert np.abs(actors[0] - actors[2]).max() > 1e-4
+
+
+def test_the_first_iteration_only_collects_statistics(run: Run):
+    world = make_world(by_action=1.0)
+    initial = run.initial(world, jax.random.key(0))
+    actor = np.asarray(initial.learner.policy.actor["params"]["output"]["kernel"])
+    first, _ = run.train(world, iterations=1)
+    second, _ = run.train(world, iterations=2)
+    assert_array_equal(first.learner.policy.actor["params"]["output"]["kernel"], actor)
+    assert float(first.learner.policy.statistics.count) == 16 * 8
+    assert np.abs(second.learner.policy.actor["params"]["output"]["kernel"] - actor).max() > 1e-4
 
 
 def test_statistics_take_in_every_observation_once(run: Run):
@@ -217,7 +228,7 @@ def test_rate_adapts_only_when_asked(run: Run, popart_run: Run):
     world = make_world(by_action=1.0)
     fixed, _ = run.train(world, iterations=2)
     assert float(fixed.learner.learning_rate_scale) == 1.0
-    adapted, metrics = popart_run.train(world, iterations=1)
+    adapted, metrics = popart_run.train(world, iterations=2)
     fraction, scale = metrics["ppo/clip_fraction"], adapted.learner.learning_rate_scale
     outside = fraction > 0.125 or fraction < 0.08
     assert (float(scale) != 1.0) == bool(outside)

@@ -85,7 +85,7 @@ def test_kl_is_summed_over_the_batch():
 def test_statistics_are_the_training_sets():
     angles, condition = arrays()
     angles = angles.at[:, 0].set(0.25)  # a hinge that never moves
-    model = CVAE(JOINTS, LATENT, (16,))
+    model, _ = make()
     statistics = init_variables(model, jax.random.key(0), angles, condition)["statistics"]
     np.testing.assert_allclose(statistics["angle_mean"], np.mean(angles, 0), rtol=1e-5)
     np.testing.assert_allclose(statistics["angle_std"][1:], np.std(angles, 0)[1:], rtol=1e-5)

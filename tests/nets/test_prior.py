@@ -9,7 +9,8 @@ from flax import serialization
 from pose_samples import QUICK, pose_set, quick_prior
 
 from getup_jax.nets import prior as pose_prior
-from getup_jax.nets.prior import MIN_LATENT_STD
+from getup_jax.nets.cvae import CVAE, init_variables
+from getup_jax.nets.prior import MIN_LATENT_STD, PosePrior
 from getup_jax.nets.prior_training import train_prior
 
 
@@ -79,11 +80,13 @@ def test_a_dict_with_a_missing_part_is_an_error():
         pose_prior.from_dict(state)
 
 
-def test_the_network_is_read_off_the_variables():
-    network = pose_prior.network(quick_prior()[0])
-    assert network.hidden_sizes == QUICK.hidden_sizes
-    assert network.latent_size == QUICK.latent_size
-    assert network.conditional
+@pytest.mark.parametrize("model", [CVAE(5, 3, (8, 4)), CVAE(5, 3, (8,), conditional=False)])
+def test_the_network_is_read_off_the_variables(model):
+    variables = init_variables(model, jax.random.key(0), jnp.zeros((2, 5)), jnp.zeros((2, 3)))
+    limit = jnp.ones(5)
+    prior = PosePrior(variables, jnp.zeros(3), jnp.ones(3), -limit, limit)
+    assert pose_prior.network(prior) == model
+    assert pose_prior.network(pose_prior.from_dict(pose_prior.to_dict(prior))) == model
 
 
 def test_works_as_an_argument_of_jit_and_over_leading_axes():

@@ -108,24 +108,28 @@ def test_all_terms_against_numpy():
     final, omega, joint = uniform(1, 2, N), uniform(-9, 9, N, 57), uniform(0, 1, N, 19)
     offset = uniform(-0.4, 0.4, N, 49)
     alpha = rewards.phase(target[:, 0], final)
-    for i in range(N):
-        w, p = np.asarray(value[i], float), np.asarray(target[i], float)
-        phi = min(p[0] / float(final[i]), 1.0)
-        a = math.exp(-20 * (1 - phi))
-        r_h = math.exp(-1.7 * abs(w[0] - p[0]))
-        r_angle = math.exp(-1.5 * (abs(w[1] - p[1]) + abs(w[2] - p[2])))
-        r_v = 1 - a + a * math.exp(-0.05 * math.sqrt(sum(float(x) ** 2 for x in omega[i])))
-        r_p = 1 - a + a * math.exp(-0.1 * sum(float(x) for x in joint[i]))
-        c = min(max((sum(abs(float(x)) for x in offset[i]) / 10) ** 2, 0), 1)
-        got = {
-            "height": rewards.height(value[i, 0], target[i, 0]),
-            "orientation": rewards.orientation(value[i, 1:], target[i, 1:]),
-            "velocity": rewards.velocity(omega[i], alpha[i]),
-            "posture": rewards.posture(joint[i], alpha[i]),
-        }
-        assert float(got["height"]) == pytest.approx(r_h, rel=1e-4)
-        assert float(got["orientation"]) == pytest.approx(r_angle, rel=1e-4)
-        assert float(got["velocity"]) == pytest.approx(r_v, rel=1e-4)
-        assert float(got["posture"]) == pytest.approx(r_p, rel=1e-4)
-        assert float(rewards.task(got)) == pytest.approx(r_h * r_angle * r_v * r_p, rel=1e-3)
-        assert float(rewards.natural(offset[i], 10.0)) == pytest.approx(1 - c, abs=1e-4)
+    got = {
+        "height": rewards.height(value[:, 0], target[:, 0]),
+        "orientation": rewards.orientation(value[:, 1:], target[:, 1:]),
+        "velocity": rewards.velocity(omega, alpha),
+        "posture": rewards.posture(joint, alpha),
+    }
+    got |= {"task": rewards.task(got), "natural": rewards.natural(offset, 10.0)}
+    inputs = [np.asarray(x, np.float64) for x in (value, target, final, omega, joint, offset)]
+    expected = [slow_terms(*row) for row in zip(*inputs, strict=True)]
+    for name, term in got.items():
+        np.testing.assert_allclose(term, [row[name] for row in expected], rtol=1e-3, atol=1e-5)
+
+
+def slow_terms(value, target, final, omega, joint, offset) -> dict[str, float]:
+    """Equations 3 to 9 of one row, with loops and doubles."""
+    alpha = math.exp(-20 * (1 - min(target[0] / final, 1.0)))
+    terms = {
+        "height": math.exp(-1.7 * abs(value[0] - target[0])),
+        "orientation": math.exp(-1.5 * (abs(value[1] - target[1]) + abs(value[2] - target[2]))),
+        "velocity": 1 - alpha + alpha * math.exp(-0.05 * math.sqrt(sum(x**2 for x in omega))),
+        "posture": 1 - alpha + alpha * math.exp(-0.1 * sum(joint)),
+    }
+    terms["task"] = math.prod(terms.values())
+    terms["natural"] = 1 - min((sum(abs(x) for x in offset) / 10) ** 2, 1.0)
+    return terms

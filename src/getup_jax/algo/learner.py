@@ -78,7 +78,8 @@ class Learner:
         learner, samples, explained = estimate(
             self.model, state.learner, collected.transition, self.config
         )
-        learner, metrics = self._improve(learner, samples, stage, key_update)
+        improved, metrics = self._improve(learner, samples, stage, key_update)
+        learner = _unless_first(learner, improved)
         policy = observe(learner.policy, collected.transition.observation)
         metrics |= {
             "ppo/explained_variance": explained,
@@ -167,6 +168,19 @@ class Learner:
         terms, metrics = ppo.loss_terms(mean, output, samples, std, weights, self.config.clip)
         value_coefficient = self.config.value_coefficient
         return ppo.total_loss(terms, value_coefficient, self.config.entropy_coefficient), metrics
+
+
+def _unless_first(learner: LearnerState, improved: LearnerState) -> LearnerState:
+    """The improved learner, but the old one while there are no observation statistics yet.
+
+    An update on raw observations is far off once they are normalised, so the first iteration of a
+    run only collects statistics.
+    """
+    statistics = learner.policy.statistics
+    if statistics is None:
+        return improved
+    first = statistics.count == 0
+    return jax.tree.map(lambda old, new: jnp.where(first, old, new), learner, improved)
 
 
 def make_learner(

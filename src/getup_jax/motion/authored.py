@@ -41,6 +41,3 @@ def _reference(path: Path, character: CharacterSpec) -> GetUp:
     points, error = curves.fit(clip_features(clip, character))
     return GetUp(motion.name, clip.duration, points, clip, motion.strategy, error)
 
-
-def authored_poses(getups, character, count, noise_rad, seed):
-    raise NotImplementedError

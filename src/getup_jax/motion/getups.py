@@ -14,6 +14,11 @@ from getup_jax.motion.strategies import classify
 from getup_jax.physics.character import CharacterSpec
 
 
+# JAX compiles once for each shape, so that frames travel in blocks of one size.
+_BLOCK = 256
+_SAMPLES = 512
+
+
 @dataclasses.dataclass(frozen=True)
 class CutSettings:
     """Where a get-up that was found by itself starts and ends."""
@@ -35,10 +40,27 @@ def cut_getup(
     name = name or f"{clip.name}:{start}-{stand}"
     part = Clip(name, clip.fps, clip.qpos[start : stand + 1].copy(), clip.source)
     positions = link_positions(part, character)
-    values = np.asarray(features(FeatureLinks.of(character), positions, 0.0))
-    points, error = curves.fit(values)
+    points, error = curves.fit(_even(clip_features(positions, character)))
     strategy = classify(positions, part.fps, character)
     return GetUp(name, part.duration, points, part, strategy, error)
+
+
+def clip_features(positions: np.ndarray, character: CharacterSpec) -> np.ndarray:
+    """Height and angles [F, 3] over flat ground, of link positions [F, L, 3]."""
+    blocks = -(-len(positions) // _BLOCK)
+    padded = np.pad(positions, ((0, blocks * _BLOCK - len(positions)), (0, 0), (0, 0)), "edge")
+    links = FeatureLinks.of(character)
+    parts = [
+        np.asarray(features(links, padded[i * _BLOCK : (i + 1) * _BLOCK], 0.0))
+        for i in range(blocks)
+    ]
+    return np.concatenate(parts)[: len(positions)].astype(np.float64)
+
+
+def _even(values: np.ndarray) -> np.ndarray:
+    """Samples [F, D] at _SAMPLES equal steps of the same duration, the ends unchanged."""
+    old, new = np.linspace(0, 1, len(values)), np.linspace(0, 1, _SAMPLES)
+    return np.stack([np.interp(new, old, column) for column in values.T], axis=1)
 
 
 def find_getups(

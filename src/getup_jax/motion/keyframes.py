@@ -1,8 +1,9 @@
 """Authored motions: the public names of the keyframe files and of the library made from them."""
 
-from getup_jax.motion.authored import authored_poses, load_authored
+from getup_jax.motion.authored import load_authored
 from getup_jax.motion.keyframe_clip import clip_from_keyframes
 from getup_jax.motion.keyframe_file import Keyframe, KeyframeMotion, read_keyframes
+from getup_jax.motion.variation import authored_poses
 
 __all__ = [
     "Keyframe",

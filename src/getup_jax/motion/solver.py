@@ -13,9 +13,15 @@ import dataclasses
 
 import mujoco
 import numpy as np
+from scipy.linalg import blas, lapack
+from scipy.spatial.transform import Rotation
 
 from getup_jax.motion.body import Body
+from getup_jax.motion.jacobian import Jacobian
 from getup_jax.motion.targets import Targets
+
+
+_HOLD = 1e6  # stiffness that holds a hinge at its limit, far above every weight
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,15 +38,16 @@ class SolverSettings:
         default_factory=lambda: {
             **{"pelvis": 0.1, "spine": 0.03, "neck": 0.02, "head": 0.05, "thigh": 0.02},
             **{"shin": 0.02, "foot": 0.05, "shoulder": 0.02, "arm": 0.01, "forearm": 0.02},
-            **{"hand": 0.03},
+            **{"hand": 0.005},
         }
     )
     floor: float = 20.0  # per m of a hull point below the floor
     previous: float = 1e-3  # per rad away from the last frame
     rest: float = 1e-4  # per rad away from the neutral pose
+    speed: float = 14.0  # rad/s; no hinge turns faster, which also bars flips through a gimbal
     iterations: int = 6  # at most, a frame
-    first_iterations: int = 80  # of the first frame, which has no start
-    tolerance: float = 1e-3  # rad; a smaller step ends a frame
+    first_iterations: int = 20  # rounds on the first frame, which has no last one
+    tolerance: float = 3e-3  # rad; a smaller step ends a frame
 
 
 class FrameSolver:
@@ -48,18 +55,33 @@ class FrameSolver:
 
     def __init__(self, body: Body, targets: Targets, settings: SolverSettings) -> None:
         character = body.character
-        self.body, self.targets, self.settings = body, targets, settings
+        self.body, self.settings = body, settings
         self.model, self.data = character.model, mujoco.MjData(character.model)
         self.lower, self.upper = character.joint_lower, character.joint_upper
         self.rest = np.clip(character.neutral_qpos[7:], self.lower, self.upper)
-        self.moves = _moves(self.model)  # [L, J]
-        self.weights = _weights(targets, settings, len(character.link_names))
+        self.low, self.high = self.lower, self.upper  # of the frame being solved
+        self.reach = settings.speed / targets.fps  # rad, how far a hinge turns in a frame
+        self.wanted, self.turned = targets.position, targets.rotation
+        self.untwist = _untwist(targets.rotation)
+        self.jacobian = Jacobian(self.model, body.hull.link)
+        self.scale = np.sqrt(_weights(targets, settings, len(character.link_names)))
 
-    def solve(self, qpos: np.ndarray, frame: int, iterations: int) -> np.ndarray:
-        """The pose nearest to the targets of a frame, started at `qpos` [7 + J]."""
+    def first(self) -> np.ndarray:
+        """The pose [7 + J] of frame 0, started from the neutral pose at the target's root."""
+        qpos, root = self.body.character.neutral_qpos.copy(), self.body.links["pelvis"]
+        qpos[:3] = self.wanted[0, root]
+        mujoco.mju_mat2Quat(qpos[3:7], self.turned[0, root].ravel())
+        for _ in range(self.settings.first_iterations):
+            qpos = self.solve(qpos, 0)
+        return qpos
+
+    def solve(self, qpos: np.ndarray, frame: int) -> np.ndarray:
+        """The pose nearest to the targets of a frame, reached from the last pose [7 + J]."""
         previous = qpos[7:].copy()
         qpos = qpos.copy()
-        for _ in range(iterations):
+        self.low = np.maximum(self.lower, previous - self.reach)
+        self.high = np.minimum(self.upper, previous + self.reach)
+        for _ in range(self.settings.iterations):
             hessian, gradient = self._normal_equations(qpos, frame, previous)
             step = self._bounded_step(qpos, hessian, gradient)
             _apply(qpos, step)
@@ -70,144 +92,96 @@ class FrameSolver:
     def _normal_equations(
         self, qpos: np.ndarray, frame: int, previous: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """H [n, n] and the downhill vector [n] of the linearised cost; n = 6 + J."""
+        """H [n, n] (lower half) and the downhill vector [n] of the linearised cost; n = 6 + J."""
         data, settings = self.data, self.settings
         data.qpos[:] = qpos
         mujoco.mj_kinematics(self.model, data)
-        position, rotation = data.xpos[1:], data.xmat[1:].reshape(-1, 3, 3)
-        axis, anchor = self._axes(qpos)
-        links = np.arange(len(position))
-        turn = self.moves[:, :, None] * axis  # [L, 3 + J, 3]
-        move = _jacobian(axis, anchor, position, self.moves, links)  # [L, 6 + J, 3]
-        wanted = self.targets.position[frame] - position
-        twist = _log(self.targets.rotation[frame] @ rotation.transpose(0, 2, 1))
-        rows = [_rows(move), _rows(np.concatenate([np.zeros((len(links), 3, 3)), turn], axis=1))]
-        right = [wanted.ravel(), twist.ravel()]
-        weight = [self.weights[0], self.weights[1]]
-        under = self._under_floor(position, rotation)
-        if under is not None:
-            points, chosen, depth = under
-            moved = _jacobian(axis, anchor, points, self.moves, self.body.hull.link[chosen])
-            rows.append(moved[..., 2])
-            right.append(depth)
-            weight.append(np.full(len(depth), settings.floor))
-        jacobian, scale = np.concatenate(rows), np.concatenate(weight)
-        weighted = jacobian.T * scale
-        hessian, gradient = weighted @ jacobian, weighted @ np.concatenate(right)
-        hinge = np.arange(6, len(hessian))
-        hessian[hinge, hinge] += settings.previous + settings.rest
-        hessian[np.arange(6), np.arange(6)] += 1e-9
+        self.jacobian.move_to(data)
+        error = [
+            (self.wanted[frame] - data.xpos[1:]).ravel(),
+            _rotation_vectors(self.untwist[frame], data.xquat[1:]).ravel(),
+        ]
+        rows = self.jacobian.links() * self.scale[:, None]
+        right = np.concatenate(error) * self.scale
+        points, chosen, depth = self._under_floor()
+        if len(chosen):
+            weight = np.sqrt(settings.floor)
+            rows = np.concatenate([rows, weight * self.jacobian.heights(points, chosen)])
+            right = np.concatenate([right, weight * depth])
+        hessian = blas.dsyrk(1.0, rows.T, lower=1)
+        gradient = right @ rows
+        hessian.flat[:: len(hessian) + 1] += 1e-9
+        hessian.flat[6 * len(hessian) + 6 :: len(hessian) + 1] += settings.previous + settings.rest
         gradient[6:] += settings.previous * (previous - qpos[7:])
         gradient[6:] += settings.rest * (self.rest - qpos[7:])
         return hessian, gradient
 
-    def _axes(self, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """World axes and anchors [3 + J, 3]: the root about x, y, z, then the hinges."""
-        axis = np.concatenate([np.eye(3), self.data.xaxis[1:]])
-        anchor = np.concatenate([np.tile(qpos[:3], (3, 1)), self.data.xanchor[1:]])
-        return axis, anchor
-
-    def _under_floor(
-        self, position: np.ndarray, rotation: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    def _under_floor(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Hull points below the floor: places [k, 3], indices [k] and depths [k]."""
-        hull = self.body.hull
-        points = position[hull.link] + (rotation[hull.link] @ hull.point[..., None])[..., 0]
-        depth = hull.radius - points[:, 2]
-        chosen = np.flatnonzero(depth > 0)
-        return (points[chosen], chosen, depth[chosen]) if len(chosen) else None
+        hull, data = self.body.hull, self.data
+        up = data.xmat[1:, 6:][hull.link]
+        height = data.xpos[1:, 2][hull.link] + (up * hull.point).sum(axis=1) - hull.radius
+        chosen = np.flatnonzero(height < 0)
+        link = hull.link[chosen]
+        turn = data.xmat[1:][link].reshape(-1, 3, 3)
+        points = data.xpos[1:][link] + (turn @ hull.point[chosen][..., None])[..., 0]
+        return points, chosen, -height[chosen]
 
     def _bounded_step(
         self, qpos: np.ndarray, hessian: np.ndarray, gradient: np.ndarray
     ) -> np.ndarray:
         """The step with hinges that would leave their range held at its end."""
-        free = np.ones(len(gradient), bool)
-        step = np.zeros(len(gradient))
-        low, high = self.lower - qpos[7:], self.upper - qpos[7:]
+        low, high = self.low - qpos[7:], self.high - qpos[7:]
+        diagonal = np.arange(6, len(gradient))
+        held = np.zeros(len(low), bool)
         for _ in range(4):
-            right = gradient[free] - hessian[np.ix_(free, ~free)] @ step[~free]
-            step[free] = np.linalg.solve(hessian[np.ix_(free, free)], right)
-            held = np.clip(step[6:], low, high)
-            out = np.concatenate([np.zeros(6, bool), held != step[6:]])
-            step[6:] = held
+            step = lapack.dposv(hessian, gradient, lower=1)[1]
+            out = ((step[6:] < low - 1e-9) | (step[6:] > high + 1e-9)) & ~held
             if not out.any():
                 break
-            free &= ~out
+            held |= out
+            at = diagonal[out]  # a stiff spring to the limit holds the hinge there
+            hessian[at, at] += _HOLD
+            gradient[at] += _HOLD * np.clip(step[6:], low, high)[out]
+        step[6:] = np.clip(step[6:], low, high)
         return step
 
 
 def solve_clip(body: Body, targets: Targets, settings: SolverSettings) -> np.ndarray:
     """Poses [F, 7 + J] of all frames."""
     solver = FrameSolver(body, targets, settings)
-    qpos = body.character.neutral_qpos.copy()
-    root = body.links["pelvis"]
-    qpos[:3] = targets.position[0, root]
-    mujoco.mju_mat2Quat(qpos[3:7], targets.rotation[0, root].ravel())
-    qpos = solver.solve(qpos, 0, settings.first_iterations)
+    qpos = solver.first()
     poses = np.empty((len(targets.position), len(qpos)))
     for frame in range(len(poses)):
-        qpos = solver.solve(qpos, frame, settings.iterations)
+        qpos = solver.solve(qpos, frame)
         poses[frame] = qpos
     return poses
 
 
-def _moves(model: mujoco.MjModel) -> np.ndarray:
-    """[L, 3 + J] 1 where the root's turn or a hinge moves a link."""
-    count = model.nbody - 1
-    moves = np.zeros((count, model.njnt + 2))
-    moves[:, :3] = 1.0
-    for link in range(count):
-        body = link + 1
-        while body:
-            first, number = model.body_jntadr[body], model.body_jntnum[body]
-            for joint in range(first, first + number):
-                if joint > 0:
-                    moves[link, joint + 2] = 1.0
-            body = model.body_parentid[body]
-    return moves
-
-
-def _weights(targets: Targets, settings: SolverSettings, count: int) -> tuple[np.ndarray, ...]:
-    """Position and rotation weights [3 L], zero for links without a target."""
+def _weights(targets: Targets, settings: SolverSettings, count: int) -> np.ndarray:
+    """Weights [6 L] of the position and rotation rows, zero for links without a target."""
     position, rotation = np.zeros(count), np.zeros(count)
     for index, name in targets.names.items():
         limb = name.partition("_")[0]
         position[index], rotation[index] = settings.position[limb], settings.rotation[limb]
-    return np.repeat(position, 3), np.repeat(rotation, 3)
+    return np.repeat(np.concatenate([position, rotation]), 3)
 
 
-def _jacobian(
-    axis: np.ndarray, anchor: np.ndarray, points: np.ndarray, moves: np.ndarray, links: np.ndarray
-) -> np.ndarray:
-    """How points [k, 3] on links [k] move: [k, 6 + J, 3], root translation first."""
-    arm = points[:, None] - anchor
-    turn = np.empty_like(arm)
-    turn[..., 0] = axis[:, 1] * arm[..., 2] - axis[:, 2] * arm[..., 1]
-    turn[..., 1] = axis[:, 2] * arm[..., 0] - axis[:, 0] * arm[..., 2]
-    turn[..., 2] = axis[:, 0] * arm[..., 1] - axis[:, 1] * arm[..., 0]
-    turn *= moves[links][..., None]
-    return np.concatenate([np.broadcast_to(np.eye(3), (len(points), 3, 3)), turn], axis=1)
+def _untwist(rotation: np.ndarray) -> np.ndarray:
+    """[F, L, 4, 4] that take a link's quaternion to target times its inverse."""
+    flat = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    w, x, y, z = flat.T
+    rows = [[w, x, y, z], [x, -w, z, -y], [y, -z, -w, x], [z, y, -x, -w]]
+    return np.moveaxis(np.array(rows), -1, 0).reshape(*rotation.shape[:2], 4, 4)
 
 
-def _rows(jacobian: np.ndarray) -> np.ndarray:
-    """[k, n, 3] to [3 k, n]."""
-    return jacobian.transpose(0, 2, 1).reshape(-1, jacobian.shape[1])
-
-
-def _log(rotation: np.ndarray) -> np.ndarray:
-    """Rotation vectors [L, 3] of matrices [L, 3, 3]."""
-    vector = 0.5 * np.stack(
-        [
-            rotation[:, 2, 1] - rotation[:, 1, 2],
-            rotation[:, 0, 2] - rotation[:, 2, 0],
-            rotation[:, 1, 0] - rotation[:, 0, 1],
-        ],
-        axis=-1,
-    )
-    sine = np.linalg.norm(vector, axis=-1)
-    cosine = 0.5 * (np.trace(rotation, axis1=1, axis2=2) - 1.0)
-    angle = np.arctan2(sine, cosine)
-    return vector * (angle / np.maximum(sine, 1e-9))[:, None]
+def _rotation_vectors(untwist: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
+    """World rotation vectors [L, 3] from links [L, 4] to their targets."""
+    error = (untwist @ quaternion[..., None])[..., 0]
+    error *= np.where(error[:, :1] < 0, -1.0, 1.0)
+    sine = np.linalg.norm(error[:, 1:], axis=1)
+    angle = 2.0 * np.arctan2(sine, error[:, 0])
+    return error[:, 1:] * (angle / np.maximum(sine, 1e-9))[:, None]
 
 
 def _apply(qpos: np.ndarray, step: np.ndarray) -> None:

@@ -8,10 +8,12 @@ hinges of all ranges alike, while the loss is the paper's, in rad^2.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import linen as nn
 
 from getup_jax.nets.mlp import OUTPUT_LAYER
@@ -89,15 +91,19 @@ def init_variables(
     model: CVAE, key: jax.Array, angles: jax.Array, condition: jax.Array
 ) -> dict[str, Any]:
     """Fresh parameters, with the statistics of training angles [N, J] and conditions [N, 3]."""
-    inputs = (angles[:1], condition[:1], jnp.zeros((1, model.latent_size)))
-    variables = jax.jit(model.init)(key, *inputs)
     statistics = {
-        "angle_mean": jnp.mean(angles, axis=0),
-        "angle_std": jnp.maximum(jnp.std(angles, axis=0), MIN_STD),
-        "condition_mean": jnp.mean(condition, axis=0),
-        "condition_std": jnp.maximum(jnp.std(condition, axis=0), MIN_STD),
+        "angle_mean": np.mean(angles, axis=0),
+        "angle_std": np.maximum(np.std(angles, axis=0), MIN_STD),
+        "condition_mean": np.mean(condition, axis=0),
+        "condition_std": np.maximum(np.std(condition, axis=0), MIN_STD),
     }
-    return {**variables, "statistics": statistics}
+    return {**_init(model, key), "statistics": jax.tree.map(jnp.asarray, statistics)}
+
+
+@partial(jax.jit, static_argnames="model")
+def _init(model: CVAE, key: jax.Array) -> Any:
+    sizes = (model.num_joints, CONDITION_SIZE, model.latent_size)
+    return model.init(key, *(jnp.zeros(size) for size in sizes))
 
 
 def kl_to_standard_normal(mean: jax.Array, log_variance: jax.Array) -> jax.Array:

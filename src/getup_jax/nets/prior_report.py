@@ -13,7 +13,7 @@ import numpy as np
 from getup_jax.nets import prior as pose_prior
 from getup_jax.nets.prior import PosePrior
 from getup_jax.nets.prior_data import pose_conditions
-from getup_jax.nets.prior_training import limit_check, rmse_deg
+from getup_jax.nets.prior_training import limit_check, random_latents, rmse_deg
 from getup_jax.physics.character import CharacterSpec
 
 DEEP_M = 0.02  # a penetration of more than this counts
@@ -65,7 +65,9 @@ def evaluate_prior(
     """
     condition = pose_conditions(poses, character)
     angles, c = jnp.asarray(poses[:, 7:], jnp.float32), jnp.asarray(condition)
-    decoded, random = _decoded(prior, angles, c, jax.random.key(seed))
+    decode, encode = jax.jit(pose_prior.decode), jax.jit(pose_prior.encode)
+    decoded = decode(prior, encode(prior, angles, c), c)
+    random = decode(prior, random_latents(prior, len(poses), seed), c)
     return PriorEvaluation(
         num_poses=len(poses),
         rmse_deg=rmse_deg(prior, angles, c),
@@ -76,17 +78,6 @@ def evaluate_prior(
         decoded_penetration=self_penetration(decoded, character),
         random_penetration=self_penetration(random, character),
     )
-
-
-@jax.jit
-def _decoded(
-    prior: PosePrior, angles: jax.Array, condition: jax.Array, key: jax.Array
-) -> tuple[jax.Array, jax.Array]:
-    """Joint angles [N, J] of the poses' own latents, and of random ones, under [N, 3]."""
-    action = jax.random.normal(key, (len(angles), prior.latent_size))
-    latent = pose_prior.encode(prior, angles, condition)
-    random = pose_prior.decode_action(prior, action, condition)
-    return pose_prior.decode(prior, latent, condition), random
 
 
 def feature_error(

@@ -88,15 +88,17 @@ def train_prior(
     num_joints = poses.angles.shape[1]
     model = CVAE(num_joints, config.latent_size, config.hidden_sizes, config.conditional)
     variables, epochs, updates = _fit(model, train, config, progress)
-    mean, _ = jax.jit(partial(model.apply, method="encode"))(variables, *train)
+    latent_mean, latent_std = _latent_scale(model, variables, *train)
     prior = PosePrior(
         variables=variables,
-        latent_mean=jnp.mean(mean, axis=0),
-        latent_std=jnp.maximum(jnp.std(mean, axis=0), MIN_LATENT_STD),
+        latent_mean=latent_mean,
+        latent_std=latent_std,
         joint_lower=jnp.asarray(poses.joint_lower),
         joint_upper=jnp.asarray(poses.joint_upper),
     )
-    random = decode_random(prior, jnp.asarray(poses.condition), jax.random.key(config.seed))
+    drawn = np.random.default_rng(config.seed).integers(len(train[0]), size=NUM_RANDOM_LATENTS)
+    latent = random_latents(prior, NUM_RANDOM_LATENTS, config.seed)
+    random = jax.jit(pose_prior.decode)(prior, latent, train[1][drawn])
     report = PriorReport(
         num_poses=len(train[0]),
         num_heldout=len(heldout[0]),
@@ -113,15 +115,10 @@ def train_prior(
     return prior, report
 
 
-@partial(jax.jit, static_argnames="count")
-def decode_random(
-    prior: PosePrior, condition: jax.Array, key: jax.Array, count: int = NUM_RANDOM_LATENTS
-) -> jax.Array:
-    """Decoded latents z ~ N(latent_mean, latent_std) under drawn conditions, [count, J] rad."""
-    key_action, key_row = jax.random.split(key)
-    action = jax.random.normal(key_action, (count, prior.latent_size))
-    row = jax.random.randint(key_row, (count,), 0, len(condition))
-    return pose_prior.decode_action(prior, action, condition[row])
+def random_latents(prior: PosePrior, count: int, seed: int) -> jax.Array:
+    """Latents drawn from N(latent_mean, latent_std), [count, Z]."""
+    noise = np.random.default_rng(seed).standard_normal((count, prior.latent_size), np.float32)
+    return prior.latent_mean + prior.latent_std * noise
 
 
 def limit_check(prior: PosePrior, angles: jax.Array) -> dict[str, float]:
@@ -144,6 +141,16 @@ def pca_variance(angles: np.ndarray, components: int) -> float:
     """Share of the variance of angles [N, J] that the first principal components cover."""
     eigenvalues = np.linalg.eigvalsh(np.cov(angles, rowvar=False))[::-1]
     return float(eigenvalues[:components].sum() / eigenvalues.sum())
+
+
+@partial(jax.jit, static_argnames="model")
+def _latent_scale(
+    model: CVAE, variables: Any, angles: jax.Array, condition: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Mean and standard deviation [Z] of the encoded poses, the latter floored."""
+    moments: Any = model.apply(variables, angles, condition, method="encode")
+    mean, _ = moments
+    return jnp.mean(mean, axis=0), jnp.maximum(jnp.std(mean, axis=0), MIN_LATENT_STD)
 
 
 @jax.jit
@@ -217,4 +224,4 @@ def _update(
     gradient, terms = jax.grad(loss, has_aux=True)(params)
     change, moments = recipe.optimiser.update(gradient, state.moments, params)
     variables = {**state.variables, "params": optax.apply_updates(params, change)}
-    return state.replace(variables=variables, moments=moments), terms
+    return FitState(variables, moments, state.key), terms
