@@ -5,6 +5,7 @@ import sys
 import types
 import warnings
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,20 +14,26 @@ from getup_jax.config import ConfigError
 from getup_jax.paths import config_path
 
 
+class FakeTrain(types.ModuleType):
+    """getup_jax.train with a run that only notes its arguments."""
+
+    def __init__(self) -> None:
+        super().__init__("getup_jax.train")
+        self.made: list[tuple[Any, ...]] = []
+        self.result: int | None = None
+
+    def run(self, *arguments: Any) -> int | None:
+        self.made.append(arguments)
+        return self.result
+
+
 @pytest.fixture
-def calls(tmp_path, monkeypatch):
-    """The calls of a train.run that does nothing, from an empty folder."""
-    made = []
-
-    def run(*arguments):
-        made.append(arguments)
-        return run.result
-
-    run.result = None
+def calls(tmp_path, monkeypatch) -> FakeTrain:
+    """The calls of `train.run`, from an empty folder."""
+    module = FakeTrain()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(sys.modules, "getup_jax.train", types.SimpleNamespace(run=run))
-    made_by = types.SimpleNamespace(made=made, run=run)
-    return made_by
+    monkeypatch.setitem(sys.modules, "getup_jax.train", module)
+    return module
 
 
 def test_train_gets_settings_and_the_default_run_folder(calls, capsys):
@@ -46,14 +53,17 @@ def test_train_takes_options_between_overrides(calls, capsys):
 
 @pytest.mark.parametrize(("number", "code"), [(None, 0), (2, 130), (15, 143)])
 def test_the_exit_code_tells_of_a_signal(calls, number, code):
-    calls.run.result = number
+    calls.result = number
     assert cli.train_main(["quick"]) == code
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["quick", "ppo.learnig_rate=1"], "ConfigError: ppo.learnig_rate: unknown key; did you mean"),
+        (
+            ["quick", "ppo.learnig_rate=1"],
+            "ConfigError: ppo.learnig_rate: unknown key; did you mean",
+        ),
         (["nothing.yaml"], "ConfigError: nothing.yaml: no such config file; the shipped configs"),
         (["quick", "--run", "full"], "RunError: full: holds a run already; add --resume"),
         (["quick", "--run", "full/file"], "RunError: full/file: is a file"),
@@ -80,7 +90,7 @@ def test_errors_of_ours_keep_their_traceback(calls, monkeypatch):
     def fail(*_):
         raise ValueError("a shape does not fit")
 
-    monkeypatch.setattr(sys.modules["getup_jax.train"], "run", fail)
+    monkeypatch.setattr(calls, "run", fail)
     with pytest.raises(ValueError, match="a shape"):
         cli.train_main(["quick"])
 
@@ -90,7 +100,7 @@ def test_warnings_are_one_clean_line(calls, capsys, monkeypatch):
         warnings.warn("going back to 00000003", RuntimeWarning, stacklevel=2)
 
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
-    monkeypatch.setattr(sys.modules["getup_jax.train"], "run", warn)
+    monkeypatch.setattr(calls, "run", warn)
     assert cli.train_main(["quick"]) == 0
     # pytest records warnings itself, so the printer is called as Python would.
     warnings.showwarning("going back to 00000003", RuntimeWarning, "file.py", 3)
@@ -107,7 +117,9 @@ sys.exit(code if not heavy else f"imported {heavy}")
 
 
 def test_a_wrong_setting_is_answered_before_anything_heavy_is_imported():
-    done = subprocess.run([sys.executable, "-c", EARLY], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", EARLY], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
 

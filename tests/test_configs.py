@@ -31,7 +31,7 @@ def leaves(cls: type, prefix: str = "") -> list[str]:
     """The dotted names of all settings, those of optional and listed sub-configs too."""
     found = []
     for name, hint in typing.get_type_hints(cls).items():
-        inner = [part for part in parts(hint) if dataclasses.is_dataclass(part)]
+        inner: list[typing.Any] = [part for part in parts(hint) if dataclasses.is_dataclass(part)]
         below = [leaf for part in inner for leaf in leaves(part, f"{prefix}{name}.")]
         found += below or [prefix + name]
     return found

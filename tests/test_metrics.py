@@ -167,7 +167,8 @@ def test_counts(number, text):
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"), [(0.4, "0 s"), (59.6, "1 min 00 s"), (200, "3 min 20 s"), (7500, "2 h 05 min")]
+    ("seconds", "text"),
+    [(0.4, "0 s"), (59.6, "1 min 00 s"), (200, "3 min 20 s"), (7500, "2 h 05 min")],
 )
 def test_durations(seconds, text):
     assert duration(seconds) == text
@@ -189,7 +190,11 @@ def show(quiet: bool, terminal: bool) -> str:
 
 def test_plain_lines_where_there_is_no_terminal():
     update = "500/1 k steps  100/s  5 s left  reward 0.250  return rate 0.500"
-    assert show(quiet=False, terminal=False).splitlines() == ["compiling [bold] ...", update, "done"]
+    assert show(quiet=False, terminal=False).splitlines() == [
+        "compiling [bold] ...",
+        update,
+        "done",
+    ]
 
 
 def test_a_bar_on_a_terminal():

@@ -64,5 +64,5 @@ def test_the_cache_folder_of_each_platform(tmp_path, monkeypatch, platform, vari
 def test_a_cache_folder_that_cannot_be_made_says_what_to_do(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("GETUP_JAX_CACHE", str(tmp_path / "file" / "cache"))
-    with pytest.raises(OSError, match="cannot create.*set GETUP_JAX_CACHE"):
+    with pytest.raises(OSError, match=r"cannot create.*set GETUP_JAX_CACHE"):
         paths.cache_dir()

@@ -26,7 +26,9 @@ def test_no_file_and_no_overrides_give_the_defaults():
 
 def test_a_file_changes_only_what_it_names(write):
     config = load_config(write("seed: 3\nppo:\n  epochs: 7\n"))
-    expected = dataclasses.replace(Config(), seed=3, ppo=dataclasses.replace(Config().ppo, epochs=7))
+    expected = dataclasses.replace(
+        Config(), seed=3, ppo=dataclasses.replace(Config().ppo, epochs=7)
+    )
     assert config == expected
 
 
@@ -87,7 +89,10 @@ def test_numbers_that_yaml_takes_for_text_convert_in_files_too(write):
         ("ppo.epochs=", "ppo.epochs: expected a whole number (int), got None (NoneType)"),
         ("ppo.clip=.nan", "ppo.clip: expected a number (float), got nan (float)"),
         ("ppo.popart=1", "ppo.popart: expected true or false (bool), got 1 (int)"),
-        ("network.hidden_sizes=64", "expected a list, got 64 (int); write network.hidden_sizes=[64]"),
+        (
+            "network.hidden_sizes=64",
+            "expected a list, got 64 (int); write network.hidden_sizes=[64]",
+        ),
         ("network.hidden_sizes=[64, x]", "network.hidden_sizes[1]: expected a whole number (int)"),
         ("ppo=3", "ppo: expected a mapping of settings, got 3 (int)"),
         ("seed.x=3", "seed: expected a whole number (int), got {'x': 3} (dict)"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class Journal:
         return (now[0] - since[0]) * self._per_iteration / max(now[1] - since[1], 1e-9)
 
 
-def means(rows: list[Mapping[str, float]]) -> dict[str, float]:
+def means(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Per name the mean over the rows, without NaNs; NaN where there is nothing else."""
     result = {}
     for name in rows[-1]:

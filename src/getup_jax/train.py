@@ -25,8 +25,6 @@ Log = Callable[[str], None]
 
 def build_job(config: Config, log: Log) -> Job:
     """The task and the learner that the settings ask for."""
-    from getup_jax.tasks.build import build_task
-
     task = build_task(config, log)
     learner = make_learner(
         task.environment, config.network, config.ppo, total_steps=config.train.total_steps

@@ -85,9 +85,20 @@ class StepOutput:
 class Environment(Protocol):
     """A batch of B episodes with automatic resets; pure functions of their arguments."""
 
-    observation_size: int
-    action_size: int
-    num_objectives: int  # K
+    @property
+    def observation_size(self) -> int:
+        """O."""
+        ...
+
+    @property
+    def action_size(self) -> int:
+        """A."""
+        ...
+
+    @property
+    def num_objectives(self) -> int:
+        """K."""
+        ...
 
     def init(self, world: Any, key: jax.Array, num_envs: int) -> Any:
         """First state of B episodes: a pytree with a field `observation` [B, O]."""

@@ -9,7 +9,7 @@ from flax import serialization
 from pose_samples import QUICK, pose_set, quick_prior
 
 from getup_jax.nets import prior as pose_prior
-from getup_jax.nets.cvae import CVAE, init_variables
+from getup_jax.nets.cvae import CVAE
 from getup_jax.nets.prior import MIN_LATENT_STD, PosePrior
 from getup_jax.nets.prior_training import train_prior
 
@@ -82,7 +82,9 @@ def test_a_dict_with_a_missing_part_is_an_error():
 
 @pytest.mark.parametrize("model", [CVAE(5, 3, (8, 4)), CVAE(5, 3, (8,), conditional=False)])
 def test_the_network_is_read_off_the_variables(model):
-    variables = init_variables(model, jax.random.key(0), jnp.zeros((2, 5)), jnp.zeros((2, 3)))
+    sizes = (jnp.zeros(size) for size in (5, 3, 3))
+    shapes = jax.eval_shape(model.init, jax.random.key(0), *sizes)
+    variables = jax.tree.map(lambda x: jnp.zeros(x.shape), shapes)
     limit = jnp.ones(5)
     prior = PosePrior(variables, jnp.zeros(3), jnp.ones(3), -limit, limit)
     assert pose_prior.network(prior) == model

@@ -41,10 +41,13 @@ def test_features_of_standing_supine_and_prone():
 def test_mirror_images_have_the_mirrored_features_and_the_same_group():
     poses = manifold_poses(60)
     poses[:, 3:7] = np.array([0.9, 0.3, 0.3, 0.1])
-    both = make_pose_set(poses, character(), mirror=True)
+    poses = np.concatenate([poses, character().mirror(poses)])
+    both = make_pose_set(poses, character(), mirrored=True)
     np.testing.assert_array_equal(both.group[:60], both.group[60:])
     expected = both.condition[:60] * [1, -1, 1] + [0, np.pi, 0]
     np.testing.assert_allclose(both.condition[60:], expected, atol=1e-4)
+    with pytest.raises(ValueError, match="got 119"):
+        make_pose_set(poses[1:], character(), mirrored=True)
 
 
 def test_blocks_are_contiguous_and_short_sets_are_cut_finer():

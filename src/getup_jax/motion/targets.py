@@ -22,6 +22,7 @@ _BONES = {"head": "neck"} | {
         ("hand", "forearm"),
     )
 }
+_FLAT_COSINE = 0.97  # between the up axis of a flat foot and up
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -173,10 +174,15 @@ def hull_heights(position: np.ndarray, rotation: np.ndarray, body: Body) -> np.n
 
 
 def _standing_level(targets: Targets, body: Body) -> float:
-    """Height of the soles while the character stands on its targets."""
-    feet = [index for index, name in targets.names.items() if name.startswith("foot")]
+    """Height of the lower sole while the character stands, on flat feet where it does."""
     heights = hull_heights(targets.position, targets.rotation, body)
-    soles = heights[:, np.isin(body.hull.link, feet)].min(axis=1)
-    root = targets.position[:, body.links["pelvis"], 2] - soles
-    standing = soles[root > 0.85 * np.percentile(root, 98)]
-    return float(np.percentile(standing, 20))
+    feet = [body.links["foot_l"], body.links["foot_r"]]
+    soles = np.stack([heights[:, body.hull.link == foot].min(axis=1) for foot in feet], axis=1)
+    lower = soles.argmin(axis=1)
+    sole = soles.min(axis=1)
+    size = targets.position[:, body.links["pelvis"], 2] - sole
+    standing = size > 0.85 * np.percentile(size, 98)
+    up = np.stack([targets.rotation[:, foot, 2, 2] for foot in feet], axis=1)
+    flat = standing & (np.take_along_axis(up, lower[:, None], axis=1)[:, 0] > _FLAT_COSINE)
+    enough = flat.sum() > 0.1 * standing.sum()
+    return float(np.percentile(sole[flat if enough else standing], 20))

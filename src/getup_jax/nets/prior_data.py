@@ -52,23 +52,24 @@ class PoseSet:
 def make_pose_set(
     poses: np.ndarray,
     character: CharacterSpec,
-    mirror: bool = False,
+    mirrored: bool = False,
     group: np.ndarray | None = None,
 ) -> PoseSet:
-    """The poses [N, 7 + J] with their features; `mirror` adds their mirror images.
+    """The poses [N, 7 + J] with their features.
 
-    `group` [N] says what is held out together, such as the noisy copies of a pose; without it, rows
-    are taken as time series and cut into blocks. A mirror image is in the group of its original.
+    `mirrored` says that the second half are the mirror images of the first, as a motion library
+    gives them; an image is held out with its original. `group` [N, or half of it if mirrored] says
+    what else is held out together; without it, rows are time series that are cut into blocks.
     """
     poses = np.asarray(poses, np.float64)
-    group = blocks(len(poses)) if group is None else np.asarray(group)
-    if mirror:
-        poses = np.concatenate([poses, character.mirror(poses)])
-        group = np.tile(group, 2)
+    images = 2 if mirrored else 1
+    if len(poses) % images:
+        raise ValueError(f"poses: expected an even number with mirror images, got {len(poses)}")
+    group = blocks(len(poses) // images) if group is None else np.asarray(group)
     return PoseSet(
         angles=poses[:, 7:].astype(np.float32),
         condition=pose_conditions(poses, character),
-        group=group,
+        group=np.tile(group, images),
         joint_lower=character.joint_lower.astype(np.float32),
         joint_upper=character.joint_upper.astype(np.float32),
     )

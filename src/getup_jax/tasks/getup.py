@@ -46,12 +46,15 @@ class GetUpTask:
     config: TaskConfig
     latent_size: int
 
-    num_objectives = 1
-
     @property
     def observation_size(self) -> int:
         """O."""
         return self.observer.size
+
+    @property
+    def num_objectives(self) -> int:
+        """K: all reward terms are multiplied into one."""
+        return 1
 
     @property
     def action_size(self) -> int:
