@@ -19,9 +19,7 @@ from getup_jax.physics.character import CharacterSpec
 
 def load_authored(character: CharacterSpec) -> list[GetUp]:
     """Every shipped get-up: the reference motions in order of name, then the drawn styles."""
-    return [
-        _reference(path, character) for path in sorted(asset_path("motions").glob("*.yaml"))
-    ]
+    return [_reference(path, character) for path in sorted(asset_path("motions").glob("*.yaml"))]
 
 
 def clip_features(clip: Clip, character: CharacterSpec) -> np.ndarray:
@@ -40,4 +38,3 @@ def _reference(path: Path, character: CharacterSpec) -> GetUp:
     clip = clip_from_keyframes(motion, character)
     points, error = curves.fit(clip_features(clip, character))
     return GetUp(motion.name, clip.duration, points, clip, motion.strategy, error)
-

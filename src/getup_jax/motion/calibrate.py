@@ -127,7 +127,7 @@ class _Moving:
         """A trunk link: its bone points up (clavicle: aside), the rest is as `base` on average."""
         axis = self.rotation[:, self.links[base]] @ frames[base]
         bone = _bone(self.recording, self.links, link)
-        forward, left, up = (self._local(link, axis[..., i]).mean(axis=0) for i in range(3))
+        left, up = (self._local(link, axis[..., i]).mean(axis=0) for i in (1, 2))
         if link.startswith("shoulder") and bone is not None:
             lateral = bone if link.endswith("_l") else -bone
             return frame_of(up=up, left=lateral, exact="left")
@@ -161,7 +161,7 @@ class _Moving:
         foot, toe = f"foot_{side}", f"toe_{side}"
         if toe not in self.links:
             axis = self.rotation[:, self.links[f"shin_{side}"]] @ frames[f"shin_{side}"]
-            forward, left, up = (self._local(foot, axis[..., i]).mean(axis=0) for i in range(3))
+            left, up = (self._local(foot, axis[..., i]).mean(axis=0) for i in (1, 2))
             return frame_of(up=up, left=left)
         ankle, tip = (self.position[:, self.links[link]] for link in (foot, toe))
         flat = _flat_frames(self.position, self.links, ankle, tip)

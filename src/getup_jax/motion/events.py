@@ -33,6 +33,9 @@ class EventSettings:
     side_cosine: float = 0.5  # |cosine of front to up| below this: lying on the side
 
 
+DEFAULTS = EventSettings()
+
+
 @dataclasses.dataclass(frozen=True)
 class Event:
     """One get-up; frames are 0-based."""
@@ -86,10 +89,10 @@ def heights_of(positions: np.ndarray, character: CharacterSpec) -> Heights:
 def find_events(
     heights: Heights,
     fps: float,
-    settings: EventSettings = EventSettings(),
+    settings: EventSettings = DEFAULTS,
 ) -> list[Event]:
     """The get-ups of a clip in order of time."""
-    lying = (heights.head < settings.lie_head) & (heights.pelvis < settings.lie_pelvis)
+    lying = lies(heights, settings)
     standing = (heights.head > settings.stand_head) & (heights.pelvis > settings.stand_pelvis)
     events = []
     for start, end in _phases(lying, standing, settings.gap_s * fps):
@@ -106,7 +109,12 @@ def find_events(
     return events
 
 
-def orientation(front_up: float, settings: EventSettings = EventSettings()) -> str:
+def lies(heights: Heights, settings: EventSettings) -> np.ndarray:
+    """Mask [F] of the frames with head and pelvis low."""
+    return (heights.head < settings.lie_head) & (heights.pelvis < settings.lie_pelvis)
+
+
+def orientation(front_up: float, settings: EventSettings = DEFAULTS) -> str:
     """supine, prone or side, by the cosine between the torso's front and up."""
     if abs(front_up) < settings.side_cosine:
         return "side"

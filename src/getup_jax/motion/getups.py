@@ -8,11 +8,17 @@ import numpy as np
 
 from getup_jax.motion import curves
 from getup_jax.motion.clips import Clip, GetUp, MotionError
-from getup_jax.motion.events import Event, EventSettings, find_events, heights_of, link_positions
+from getup_jax.motion.events import (
+    DEFAULTS,
+    Event,
+    EventSettings,
+    find_events,
+    heights_of,
+    link_positions,
+)
 from getup_jax.motion.features import FeatureLinks, features
 from getup_jax.motion.strategies import classify
 from getup_jax.physics.character import CharacterSpec
-
 
 # JAX compiles once for each shape, so that frames travel in blocks of one size.
 _BLOCK = 256
@@ -26,6 +32,9 @@ class CutSettings:
     lead_s: float = 0.25  # how much of the lying phase comes before the rise
     upright_s: float = 1.5  # the end waits this long at most for the body to straighten
     upright: float = 0.98  # it ends where the neck is this share of the highest in that time
+
+
+_CUTS = CutSettings()
 
 
 def cut_getup(
@@ -66,8 +75,8 @@ def _even(values: np.ndarray) -> np.ndarray:
 def find_getups(
     clip: Clip,
     character: CharacterSpec,
-    settings: EventSettings = EventSettings(),
-    cuts: CutSettings = CutSettings(),
+    settings: EventSettings = DEFAULTS,
+    cuts: CutSettings = _CUTS,
 ) -> tuple[list[Event], list[GetUp]]:
     """The events of a clip and one get-up for each."""
     positions = link_positions(clip, character)

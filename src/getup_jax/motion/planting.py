@@ -119,7 +119,9 @@ def lowest_points(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarra
     box = np.einsum("gij,gj->gi", axes, down * size)
     sphere = -size[:, :1] * [0, 0, 1]
     is_capsule, is_box = kind == mujoco.mjtGeom.mjGEOM_CAPSULE, kind == mujoco.mjtGeom.mjGEOM_BOX
-    return solid, data.geom_xpos[solid] + np.where(is_capsule, capsule, np.where(is_box, box, sphere))
+    return solid, data.geom_xpos[solid] + np.where(
+        is_capsule, capsule, np.where(is_box, box, sphere)
+    )
 
 
 def geom_bottoms(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:

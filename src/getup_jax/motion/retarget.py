@@ -24,6 +24,7 @@ from getup_jax.motion.skeleton import (
     resampled,
     rest_positions,
     scaled,
+    without_first,
 )
 from getup_jax.motion.solver import SolverSettings, solve_clip
 from getup_jax.motion.targets import Targets, hull_heights, make_targets
@@ -92,7 +93,9 @@ def prepare(
         raise MotionError(f"{recording.name}: expected at least one frame, got none")
     recording = scaled(recording, settings.metres or guess_unit(recording, links))
     if starts_in_t_pose(recording, links):
-        recording = cut(recording, 1, recording.num_frames).warn("first row is a T-pose: dropped")
+        recording = without_first(recording).warn(
+            "first row is a T-pose: dropped (the second stands in, so frame numbers stay)"
+        )
     return resampled(recording, settings.fps)
 
 

@@ -107,6 +107,16 @@ def cut(recording: Recording, start: int, stop: int) -> Recording:
     )
 
 
+def without_first(recording: Recording) -> Recording:
+    """Frame 0 replaced by frame 1, so that the other frames keep their numbers."""
+    index = np.maximum(np.arange(recording.num_frames), 1)
+    return dataclasses.replace(
+        recording,
+        translations=recording.translations[index],
+        rotations=recording.rotations[index],
+    )
+
+
 def resampled(recording: Recording, fps: float) -> Recording:
     """The same motion at another rate: slerp of the rotations, linear in the positions."""
     if recording.num_frames < 2 or abs(recording.fps - fps) < 1e-3 * fps:

@@ -13,14 +13,15 @@ import dataclasses
 
 import mujoco
 import numpy as np
-from scipy.linalg import blas, lapack
+from scipy.linalg import get_blas_funcs, get_lapack_funcs
 from scipy.spatial.transform import Rotation
 
 from getup_jax.motion.body import Body
 from getup_jax.motion.jacobian import Jacobian
 from getup_jax.motion.targets import Targets
 
-
+_GRAM = get_blas_funcs("syrk", dtype=np.float64)  # A A^T, lower half
+_SOLVE = get_lapack_funcs("posv", dtype=np.float64)  # by Cholesky, from the lower half
 _HOLD = 1e6  # stiffness that holds a hinge at its limit, far above every weight
 
 
@@ -108,7 +109,7 @@ class FrameSolver:
             weight = np.sqrt(settings.floor)
             rows = np.concatenate([rows, weight * self.jacobian.heights(points, chosen)])
             right = np.concatenate([right, weight * depth])
-        hessian = blas.dsyrk(1.0, rows.T, lower=1)
+        hessian = _GRAM(1.0, rows.T, lower=1)
         gradient = right @ rows
         hessian.flat[:: len(hessian) + 1] += 1e-9
         hessian.flat[6 * len(hessian) + 6 :: len(hessian) + 1] += settings.previous + settings.rest
@@ -134,8 +135,8 @@ class FrameSolver:
         low, high = self.low - qpos[7:], self.high - qpos[7:]
         diagonal = np.arange(6, len(gradient))
         held = np.zeros(len(low), bool)
-        for _ in range(4):
-            step = lapack.dposv(hessian, gradient, lower=1)[1]
+        step = _SOLVE(hessian, gradient, lower=1)[1]
+        for _ in range(3):
             out = ((step[6:] < low - 1e-9) | (step[6:] > high + 1e-9)) & ~held
             if not out.any():
                 break
@@ -143,6 +144,7 @@ class FrameSolver:
             at = diagonal[out]  # a stiff spring to the limit holds the hinge there
             hessian[at, at] += _HOLD
             gradient[at] += _HOLD * np.clip(step[6:], low, high)[out]
+            step = _SOLVE(hessian, gradient, lower=1)[1]
         step[6:] = np.clip(step[6:], low, high)
         return step
 

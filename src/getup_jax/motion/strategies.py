@@ -89,9 +89,7 @@ def find_phases(
     kneeling = (low_knee < settings.touch) & (high_knee > settings.knee_up) & ~facing_down
     return {
         "sit": (pelvis < settings.seat) & (trunk_up > settings.sit_upright),
-        "fours": facing_down
-        & (pelvis > settings.raised)
-        & (hands.min(axis=1) < settings.touch),
+        "fours": facing_down & (pelvis > settings.raised) & (hands.min(axis=1) < settings.touch),
         "kneel": kneeling & (pelvis > settings.raised),
         "front_up": front_up,
     }

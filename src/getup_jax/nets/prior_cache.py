@@ -22,37 +22,54 @@ from getup_jax.nets.prior_training import PriorReport, train_prior
 # Raise it whenever the same poses and settings would give another prior, or the files change.
 FORMAT = 1
 
+_DECIMALS = 3  # of the statistics (rad, m) that tell one set of poses from another
+
 Log = Callable[[str], None]
+
+_DAMAGED = (OSError, EOFError, ValueError, TypeError, KeyError, zipfile.BadZipFile)
 
 
 def cached_prior(
-    poses: PoseSet, config: PriorConfig, folder: Path, log: Log = print
+    poses: PoseSet,
+    config: PriorConfig,
+    folder: Path,
+    log: Log = print,
+    shipped: Path | None = None,
 ) -> tuple[PosePrior, PriorReport]:
-    """The prior of these poses and settings: read from `folder`, else trained and written there.
+    """The prior of these poses and settings: shipped, read from `folder`, or trained now.
 
-    A file that cannot be read is reported and made again. Raises OSError where `folder` cannot be
-    written.
+    A newly trained one is written to `folder`. A file that cannot be read is reported and made
+    again. Raises OSError where `folder` cannot be written.
     """
-    path = folder / f"prior-{fingerprint(poses, config)}.npz"
-    if path.exists():
-        try:
-            return load_prior(path)
-        except (OSError, EOFError, ValueError, TypeError, KeyError, zipfile.BadZipFile) as error:
-            log(f"warning: {path}: damaged, trained again ({error})")
+    name = f"prior-{fingerprint(poses, config)}.npz"
+    for path in (place / name for place in (shipped, folder) if place is not None):
+        if path.exists():
+            try:
+                return load_prior(path)
+            except _DAMAGED as error:
+                log(f"warning: {path}: damaged, trained again ({error})")
     log(f"training the pose prior on {len(poses.angles)} poses")
     prior, report = train_prior(poses, config, lambda *call: log(_progress_line(*call)))
-    save_prior(path, prior, report)
-    log(f"pose prior: {report.heldout_rmse_deg:.2f} degrees off on held-out poses, {path}")
+    save_prior(folder / name, prior, report)
+    log(f"pose prior: {report.heldout_rmse_deg:.2f} degrees off on held-out poses, {folder / name}")
     return prior, report
 
 
 def fingerprint(poses: PoseSet, config: PriorConfig) -> str:
-    """16 hexadecimal digits of a hash of every array and setting."""
-    digest = hashlib.sha256(json.dumps([FORMAT, dataclasses.asdict(config)]).encode())
+    """16 hexadecimal digits of a hash of the poses' statistics and of every setting.
+
+    The statistics are rounded, since the last bits of a pose differ between processors, and a prior
+    that is shipped must be found on all of them.
+    """
+    settings = [FORMAT, dataclasses.asdict(config), poses.angles.shape]
+    digest = hashlib.sha256(json.dumps(settings).encode())
     for field in dataclasses.fields(poses):
-        array = np.ascontiguousarray(getattr(poses, field.name))
-        digest.update(f"{field.name} {array.dtype} {array.shape}".encode())
-        digest.update(array.tobytes())
+        array = np.asarray(getattr(poses, field.name))
+        digest.update(f"{field.name} {array.shape}".encode())
+        if array.dtype.kind == "f":
+            moments = [array.mean(axis=0, dtype=np.float64), array.std(axis=0, dtype=np.float64)]
+            array = np.round(moments, _DECIMALS) + 0.0  # adding 0 turns -0 into 0
+        digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:16]
 
 

@@ -15,7 +15,7 @@ from getup_jax.motion.library import load_motions
 from getup_jax.nets.prior import PosePrior
 from getup_jax.nets.prior_cache import cached_prior
 from getup_jax.nets.prior_data import make_pose_set
-from getup_jax.paths import cache_dir
+from getup_jax.paths import asset_path, cache_dir
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.engine import make_engine
 from getup_jax.physics.terrain import Terrain
@@ -47,7 +47,9 @@ def build_task(
     log(f"motions: {len(getups)} get-ups, {len(library.poses)} poses")
     if prior is None:
         poses = make_pose_set(library.poses, character)
-        prior, _ = cached_prior(poses, config.prior, cache_dir() / "prior", log)
+        prior, _ = cached_prior(
+            poses, config.prior, cache_dir() / "prior", log, shipped=asset_path("priors")
+        )
     return assemble(config, character, getups, prior, log)
 
 
