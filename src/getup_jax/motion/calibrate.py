@@ -142,11 +142,11 @@ class _Moving:
         upper, lower = (f"{name}_{side}" for name in pair)
         bones = [_bone(self.recording, self.links, link) for link in (upper, lower)]
         bones = [-np.array(UP) if bone is None else bone / np.linalg.norm(bone) for bone in bones]
-        world = [
+        along = [
             self.rotation[:, self.links[link]] @ bone
             for link, bone in zip((upper, lower), bones, strict=True)
         ]
-        bend = sign * np.cross(*world)
+        bend = sign * np.cross(along[0], along[1])
         if np.mean(bend**2) * 3 < _LEAST_BEND:  # a straight limb: as the trunk on average
             base = "pelvis" if pair[0] == "thigh" else "spine_upper"
             bend = (self.rotation[:, self.links[base]] @ frames[base])[..., 1]

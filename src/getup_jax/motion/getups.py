@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.motion import curves
@@ -60,7 +61,7 @@ def clip_features(positions: np.ndarray, character: CharacterSpec) -> np.ndarray
     padded = np.pad(positions, ((0, blocks * _BLOCK - len(positions)), (0, 0), (0, 0)), "edge")
     links = FeatureLinks.of(character)
     parts = [
-        np.asarray(features(links, padded[i * _BLOCK : (i + 1) * _BLOCK], 0.0))
+        np.asarray(features(links, jnp.asarray(padded[i * _BLOCK : (i + 1) * _BLOCK]), 0.0))
         for i in range(blocks)
     ]
     return np.concatenate(parts)[: len(positions)].astype(np.float64)

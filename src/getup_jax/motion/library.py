@@ -49,6 +49,7 @@ def load_motions(
     files = [file for source in config.source if source != AUTHORED for file in _files(source)]
     clips, report = _clips(files, character, done)
     getups += _getups_of(clips, config.curves, character)
+    _require_unique(getups)
     chosen = _choose(getups, config.curves)
     poses += [clip.qpos for clip in clips]
     if not poses:
@@ -152,6 +153,15 @@ def _choose(getups: Sequence[GetUp], wanted: Sequence[str]) -> list[GetUp]:
         of_clip = [g for g in getups if _cut(g.name) and g.name.rpartition(":")[0] == name]
         chosen += of_clip or [_named(getups, name)]
     return chosen
+
+
+def _require_unique(getups: Sequence[GetUp]) -> None:
+    names = [getup.name for getup in getups]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise MotionError(
+            f"motion.source: two get-ups are called {', '.join(twice)}; rename one of the files"
+        )
 
 
 def _named(getups: Sequence[GetUp], name: str) -> GetUp:

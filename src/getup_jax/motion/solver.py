@@ -10,6 +10,7 @@ Minimised per frame, over the root and the hinges inside their limits:
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -20,8 +21,8 @@ from getup_jax.motion.body import Body
 from getup_jax.motion.jacobian import Jacobian
 from getup_jax.motion.targets import Targets
 
-_GRAM = get_blas_funcs("syrk", dtype=np.float64)  # A A^T, lower half
-_SOLVE = get_lapack_funcs("posv", dtype=np.float64)  # by Cholesky, from the lower half
+_GRAM: Any = get_blas_funcs("syrk", dtype=np.float64)  # A A^T, lower half
+_SOLVE: Any = get_lapack_funcs("posv", dtype=np.float64)  # by Cholesky, from the lower half
 _HOLD = 1e6  # stiffness that holds a hinge at its limit, far above every weight
 
 

@@ -46,7 +46,7 @@ def build_task(
         raise ConfigError(f"motion.source: no get-ups found in {config.motion.source}")
     log(f"motions: {len(getups)} get-ups, {len(library.poses)} poses")
     if prior is None:
-        poses = make_pose_set(library.poses, character)
+        poses = make_pose_set(library.poses, character, mirrored=config.motion.mirror)
         prior, _ = cached_prior(
             poses, config.prior, cache_dir() / "prior", log, shipped=asset_path("priors")
         )

@@ -1,0 +1,193 @@
+"""`getup-motion`: import, list and plot motions, and show the get-ups in a file."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from getup_jax.config import MotionConfig, PhysicsConfig
+from getup_jax.motion.cache import Job, Result, read_npz, retarget_files, write_npz
+from getup_jax.motion.clip_report import (
+    FileReport,
+    event_table,
+    file_table,
+    getup_table,
+    report_of,
+)
+from getup_jax.motion.clips import MotionError
+from getup_jax.motion.library import cpus, load_motions
+from getup_jax.motion.names import read_map
+from getup_jax.motion.readers import ReadOptions, motion_files
+from getup_jax.motion.retarget import RetargetSettings
+from getup_jax.physics.character import CharacterSpec, load_character
+
+_EXAMPLES = """\
+examples:
+  getup-motion import mocap/ --out clips --json report.json
+                                   read every motion file of a folder, retarget it, keep clips
+  getup-motion import walk.bvh --names map.yaml --scale 0.01 --floor 0
+  getup-motion events clips/fall.npz       when it lies, rises and stands
+  getup-motion list authored clips/        get-ups that a config can train on
+  getup-motion plot clips/ --out curves.png
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a sub-command; 1 where a file failed, and MotionError where nothing can be done."""
+    args = _parser().parse_args(argv)
+    return args.run(args, load_character(PhysicsConfig(character=args.character)))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="getup-motion",
+        description="Motion files to clips on the character, and the get-ups in them.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    load = commands.add_parser("import", help="read and retarget motion files")
+    load.add_argument("paths", nargs="+", type=Path, metavar="FILE|FOLDER")
+    load.add_argument("--out", type=Path, help="folder for the clips (.npz); none: only a check")
+    load.add_argument("--json", type=Path, help="write the report as JSON")
+    _add_reading(load)
+    load.set_defaults(run=_import)
+    show = commands.add_parser("list", help="the get-ups of motion sources")
+    show.add_argument("sources", nargs="*", default=["authored"], metavar="SOURCE")
+    show.set_defaults(run=_list)
+    plot = commands.add_parser("plot", help="draw the style curves of motion sources")
+    plot.add_argument("sources", nargs="+", metavar="SOURCE")
+    plot.add_argument("--out", type=Path, required=True, metavar="PNG")
+    plot.add_argument("--curves", nargs="*", default=[], help="only these get-ups")
+    plot.set_defaults(run=_plot)
+    events = commands.add_parser("events", help="the get-ups in one file")
+    events.add_argument("paths", nargs=1, type=Path, metavar="FILE")
+    _add_reading(events)
+    events.set_defaults(run=_events)
+    for command in (load, show, plot, events):
+        command.add_argument("--character", default="humanoid49", help="name or MJCF file")
+    return parser
+
+
+def _add_reading(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--allow-short",
+        action="store_true",
+        help="take BVH files with another number of rows than the header says",
+    )
+    parser.add_argument("--names", type=Path, help="YAML or JSON map {joint: link}")
+    parser.add_argument("--scale", type=float, help="metres in a unit of the file")
+    parser.add_argument("--up", choices=("y", "z"), default="y", help="vertical axis of BVH files")
+    parser.add_argument("--fps", type=float, default=30.0, help="rate of the clips")
+    parser.add_argument("--floor", type=float, help="height of the recording's floor (m)")
+
+
+def _import(args: argparse.Namespace, character: CharacterSpec) -> int:
+    reports = _reports(args, character)
+    if args.out:
+        _write_clips(args.out, reports, character)
+    console = Console()
+    console.print(file_table(reports))
+    _print_messages(console, reports)
+    if args.json:
+        args.json.write_text(json.dumps([report.plain() for report in reports], indent=1) + "\n")
+    return int(any(report.errors for report in reports))
+
+
+def _write_clips(folder: Path, reports: Sequence[FileReport], character: CharacterSpec) -> None:
+    """One .npz a file; files of one name get their old suffix into the new name."""
+    folder.mkdir(parents=True, exist_ok=True)
+    stems = [report.path.stem for report in reports]
+    for report in reports:
+        if report.clip and report.retarget:
+            twin = stems.count(report.path.stem) > 1
+            name = report.path.name.replace(".", "_") if twin else report.path.stem
+            clip = dataclasses.replace(report.clip, name=name)
+            write_npz(folder / f"{name}.npz", clip, report.retarget, character)
+
+
+def _events(args: argparse.Namespace, character: CharacterSpec) -> int:
+    (report,) = _reports(args, character)
+    console = Console()
+    if report.clip:
+        console.print(event_table(report, report.clip.fps))
+    _print_messages(console, [report])
+    return int(bool(report.errors))
+
+
+def _list(args: argparse.Namespace, character: CharacterSpec) -> int:
+    library = load_motions(MotionConfig(source=tuple(args.sources)), character)
+    console = Console()
+    console.print(getup_table(library.getups))
+    console.print(f"{len(library.poses)} poses for the pose prior, mirror images included")
+    return 0
+
+
+def _plot(args: argparse.Namespace, character: CharacterSpec) -> int:
+    from getup_jax.motion.plot import plot_getups
+
+    config = MotionConfig(source=tuple(args.sources), curves=tuple(args.curves))
+    library = load_motions(config, character)
+    plot_getups(library.getups, character, args.out)
+    Console().print(f"{args.out}: {len(library.getups)} get-ups")
+    return 0
+
+
+def _reports(args: argparse.Namespace, character: CharacterSpec) -> list[FileReport]:
+    files = [file for path in args.paths for file in _expand(path)]
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, TimeElapsedColumn(), console=console) as progress:
+        task = progress.add_task("retargeting", total=len(files))
+        results = _retarget(args, files, character, lambda path: progress.advance(task))
+    return [report_of(file, results[file], character) for file in files]
+
+
+def _retarget(
+    args: argparse.Namespace,
+    files: Sequence[Path],
+    character: CharacterSpec,
+    done: Callable[[Path], None],
+) -> dict[Path, Result]:
+    read = ReadOptions(up=args.up, allow_short=args.allow_short)
+    settings = RetargetSettings(
+        fps=args.fps,
+        metres=args.scale,
+        floor=args.floor,
+        names=read_map(args.names) if args.names else None,
+    )
+    jobs = [Job(file, character, read, settings) for file in files if file.suffix != ".npz"]
+    results = retarget_files(jobs, cpus(), done)
+    found = dict(zip([job.path for job in jobs], results, strict=True))
+    for file in files:
+        if file not in found:
+            try:
+                found[file] = read_npz(file, character)
+            except MotionError as error:
+                found[file] = error
+            done(file)
+    return found
+
+
+def _expand(path: Path) -> list[Path]:
+    """The motion files that an argument stands for; a missing file is reported later."""
+    if not path.is_dir():
+        return [path]
+    files = motion_files(path)
+    if not files:
+        raise MotionError(f"{path}: no motion files in this folder")
+    return files
+
+
+def _print_messages(console: Console, reports: list[FileReport]) -> None:
+    for report in reports:
+        for text in report.warnings:
+            console.print(f"warning: {report.path.name}: {text}", style="yellow", soft_wrap=True)
+        for text in report.errors:
+            console.print(f"error: {text}", style="red", soft_wrap=True)

@@ -1,0 +1,95 @@
+"""Pictures of style curves: classes of get-ups [P figure 8], and each fit over its clip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from getup_jax.motion import curves
+from getup_jax.motion.clips import GetUp, MotionError
+from getup_jax.motion.events import link_positions
+from getup_jax.motion.getups import clip_features
+from getup_jax.physics.character import CharacterSpec
+
+_LABELS = ("neck height (m)", "side to up (deg)", "front to up (deg)")
+_SCALE = np.array([1.0, 180 / np.pi, 180 / np.pi])
+_PHASE = np.linspace(0.0, 1.0, 101)
+
+
+def plot_getups(getups: Sequence[GetUp], character: CharacterSpec, file: Path) -> None:
+    """Write one PNG: mean and deviation of each strategy on top, below it one row a get-up."""
+    if not getups:
+        raise MotionError("plot: no get-ups to draw")
+    pyplot = _pyplot()
+    classes = class_curves(getups)
+    rows = len(classes) + len(getups)
+    figure, axes = pyplot.subplots(rows, 3, figsize=(11, 1.9 * rows), squeeze=False)
+    for row, (name, values) in zip(axes, classes.items(), strict=False):
+        _draw_class(row, name, values)
+    for row, getup in zip(axes[len(classes) :], getups, strict=True):
+        _draw_fit(row, getup, character)
+    for axis, label in zip(axes[0], _LABELS, strict=True):
+        axis.set_title(label)
+    figure.tight_layout()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(file, dpi=90)
+    pyplot.close(figure)
+
+
+def class_curves(getups: Sequence[GetUp]) -> dict[str, np.ndarray]:
+    """{strategy: curves [n, 101, 3] over the phase}, in the plot's units."""
+    points = jnp.asarray(np.stack([getup.points for getup in getups]))
+    weights = curves.basis(jnp.asarray(_PHASE))
+    values = np.asarray(jnp.einsum("sp,gpd->gsd", weights, points)) * _SCALE
+    names = [getup.strategy or "unclassified" for getup in getups]
+    return {
+        name: values[[i for i, other in enumerate(names) if other == name]]
+        for name in sorted(set(names))
+    }
+
+
+def _draw_class(row: Any, name: str, values: np.ndarray) -> None:
+    mean, deviation = values.mean(axis=0), values.std(axis=0)
+    for column, axis in enumerate(row):
+        low, high = (mean[:, column] + sign * deviation[:, column] for sign in (-1, 1))
+        axis.fill_between(_PHASE, low, high, alpha=0.3)
+        axis.plot(_PHASE, mean[:, column])
+        _finish(axis, column)
+    row[0].set_ylabel(f"{name}\n(n = {len(values)})", fontsize=7)
+
+
+def _draw_fit(row: Any, getup: GetUp, character: CharacterSpec) -> None:
+    fitted = np.asarray(curves.basis(jnp.asarray(_PHASE))) @ getup.points * _SCALE
+    knots = np.linspace(0.0, getup.duration, len(getup.points))
+    for column, axis in enumerate(row):
+        axis.plot(_PHASE * getup.duration, fitted[:, column], label="spline")
+        axis.plot(knots, getup.points[:, column] * _SCALE[column], "o", markersize=3)
+        _finish(axis, column)
+    if getup.clip is not None:
+        values = clip_features(link_positions(getup.clip, character), character) * _SCALE
+        times = np.arange(len(values)) / getup.clip.fps
+        for column, axis in enumerate(row):
+            axis.plot(times, values[:, column], "k", linewidth=0.8, alpha=0.6)
+    row[0].set_ylabel(f"{getup.name}\n{getup.strategy}", fontsize=6)
+
+
+def _finish(axis: Any, column: int) -> None:
+    axis.set_ylim((0.0, 1.7) if column == 0 else (0.0, 180.0))
+    axis.grid(alpha=0.3)
+
+
+def _pyplot() -> Any:
+    try:
+        import matplotlib
+    except ImportError:
+        raise MotionError(
+            "plot: matplotlib is not installed; pip install 'getup-jax[plot]'"
+        ) from None
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    return pyplot

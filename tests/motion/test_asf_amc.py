@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from getup_jax.motion.clips import MotionError
+from getup_jax.motion.readers import read_motion
+from getup_jax.motion.skeleton import forward
+
+ASF = """\
+:version 1.10
+:root
+  order TX TY TZ RX RY RZ
+  axis XYZ
+:bonedata
+  begin
+     id 1
+     name spine
+     direction 0 1 0
+     length 2
+     axis 0 0 90 XYZ
+     dof rx
+     limits (-20 20)
+  end
+  begin
+     name head
+     direction 0 1 0
+     length 1
+     axis 0 0 0 XYZ
+  end
+:hierarchy
+  begin
+    root spine
+    spine head
+  end
+"""
+AMC = """\
+#!OML
+:FULLY-SPECIFIED
+:DEGREES
+1
+root 0 5 0 0 0 0
+spine 0
+2
+root 0 5 0 0 0 0
+spine 90
+"""
+
+
+def write(tmp_path, asf=ASF, amc=AMC):
+    (tmp_path / "01.asf").write_text(asf)
+    (tmp_path / "01_01.amc").write_text(amc)
+    return tmp_path / "01_01.amc"
+
+
+def test_bones_turn_about_their_own_axes(tmp_path):
+    motion = read_motion(write(tmp_path))
+    position, _ = forward(motion)
+    assert motion.joint_names == ("root", "spine", "head")
+    np.testing.assert_allclose(position[0, 2], [0, 0, 7], atol=1e-12)
+    # the spine's x axis at rest is the world's y (file): the turn leaves its own direction
+    np.testing.assert_allclose(position[1, 2], [0, 0, 7], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("spine 90", "spine ninety", "line 9, bone spine: expected finite numbers"),
+        ("spine 90", "spine 90 1", "line 9, bone spine: expected 1 angles"),
+        ("spine 90", "tail 90", "line 9, bone tail"),
+        ("spine 90\n", "", r"frame 2: no values for bones \['spine'\]"),
+        (AMC, "", "expected frames, got none"),
+    ],
+)
+def test_errors_name_the_line_and_the_bone(tmp_path, old, new, message):
+    with pytest.raises(MotionError, match=message):
+        read_motion(write(tmp_path, amc=AMC.replace(old, new)))
+
+
+def test_a_missing_skeleton(tmp_path):
+    file = write(tmp_path)
+    (tmp_path / "01.asf").unlink()
+    with pytest.raises(MotionError, match=r"expected its skeleton 01\.asf in the same folder"):
+        read_motion(file)
+
+
+def test_both_formats_of_a_cmu_trial_agree(mocap):
+    amc, bvh = (read_motion(mocap / "cmu" / f"01_01.{kind}") for kind in ("amc", "bvh"))
+    frames = slice(200, 210)
+    hands = [(amc, "lradius", frames), (bvh, "LeftForeArm", slice(201, 211))]
+    place = []
+    for motion, name, rows in hands:
+        position = forward(motion)[0][rows]
+        place.append(position[:, motion.joint(name)] - position[:, 0])
+    assert np.linalg.norm(place[0] - place[1], axis=-1).max() < 1.5  # units of 5.6 cm

@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from getup_jax.motion.body import record
+from getup_jax.motion.bvh_writer import write_bvh
+from getup_jax.motion.clips import MotionError
+from getup_jax.motion.command import main
+from motion_samples import SUPINE, getup_clip
+
+
+@pytest.fixture
+def rise(tmp_path, character, cache):
+    """A folder with one BVH file of a get-up."""
+    clip = getup_clip(character, SUPINE, still_s=0.6, rise_s=1.2)
+    folder = tmp_path / "in"
+    folder.mkdir()
+    write_bvh(record(clip, character), folder / "rise.bvh")
+    return folder
+
+
+def test_import_list_events_and_plot(rise, tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    report = tmp_path / "report.json"
+    clips = tmp_path / "clips"
+    assert main(["import", str(rise), "--out", str(clips), "--json", str(report)]) == 0
+    (entry,) = json.loads(report.read_text())
+    assert entry["frames"] == 72
+    assert entry["errors"] == []
+    assert entry["position_error_m"] < 0.02
+    (event,) = entry["events"]
+    assert event["start"] < event["end"]
+    assert event["orientation"] == "supine"
+    assert main(["list", str(clips)]) == 0
+    assert "rise:" in capsys.readouterr().out
+    assert main(["events", str(clips / "rise.npz")]) == 0
+    assert "supine" in capsys.readouterr().out
+    assert main(["plot", str(clips), "--out", str(tmp_path / "curves.png")]) == 0
+    assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_bad_file_is_reported_and_the_others_go_on(rise, tmp_path, capsys):
+    (rise / "bad.bvh").write_text("HIERARCHY\nROOT a\n{\n")
+    report = tmp_path / "report.json"
+    assert main(["import", str(rise), "--json", str(report)]) == 1
+    bad, good = json.loads(report.read_text())
+    assert "bad.bvh" in bad["errors"][0]
+    assert bad["frames"] == 0
+    assert good["frames"] == 72
+    assert "error: bad.bvh" in capsys.readouterr().out
+
+
+def test_a_short_file_needs_a_flag(rise, tmp_path, capsys):
+    file = rise / "rise.bvh"
+    file.write_text(file.read_text().replace("Frames: 72", "Frames: 73"))
+    assert main(["import", str(file)]) == 1
+    assert "header says 73 frames, file has 72 rows" in capsys.readouterr().out
+    assert main(["import", str(file), "--allow-short"]) == 0
+    assert "warning" in capsys.readouterr().out
+
+
+def test_a_clip_that_never_lies_is_warned_about(tmp_path, character, cache, capsys):
+    clip = getup_clip(character, SUPINE)
+    clip.qpos[:] = character.neutral_qpos
+    write_bvh(record(clip, character), tmp_path / "stand.bvh")
+    assert main(["import", str(tmp_path / "stand.bvh")]) == 0
+    assert "no get-up found: it never lies" in capsys.readouterr().out
+
+
+def test_an_empty_folder_and_a_missing_map(tmp_path, rise):
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    with pytest.raises(MotionError, match="no motion files"):
+        main(["import", str(empty)])
+    with pytest.raises(MotionError, match="not a readable name map"):
+        main(["import", str(rise), "--names", str(tmp_path / "map.yaml")])
