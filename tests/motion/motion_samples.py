@@ -48,13 +48,14 @@ def random_pose(character, rng, spread=0.6):
 
 
 def getup_clip(character, lying=SUPINE, still_s=1.0, rise_s=2.0, name="rise"):
-    """Lies still, rises evenly as a board and stands still, at 30 fps."""
+    """Lies still, rises like a board on its feet and stands still, at 30 fps."""
     still, rise = round(30 * still_s), round(30 * rise_s)
     share = np.clip((np.arange(2 * still + rise) - still) / rise, 0, 1)
     qpos = np.tile(character.neutral_qpos, (len(share), 1))
     turn = Slerp([0, 1], Rotation.concatenate([lying, Rotation.identity()]))(share)
     qpos[:, 3:7] = turn.as_quat(scalar_first=True)
-    qpos[:, 2] = 0.12 + share * (character.neutral_qpos[2] - 0.12)
+    height = character.neutral_qpos[2]
+    qpos[:, 2] = np.maximum(0.12, height - 0.84 * (1 - np.sin(share * np.pi / 2)))
     return Clip(name, 30.0, qpos)
 
 

@@ -2,14 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from motion_samples import TINY_BVH, random_pose
 
 from getup_jax.motion.body import record
 from getup_jax.motion.bvh import BvhOptions, read_bvh
 from getup_jax.motion.bvh_writer import write_bvh
 from getup_jax.motion.clips import Clip, MotionError
 from getup_jax.motion.skeleton import forward
-
-from motion_samples import TINY_BVH, random_pose
 
 Z_UP = BvhOptions(up="z")
 

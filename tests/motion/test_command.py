@@ -3,18 +3,18 @@ from __future__ import annotations
 import json
 
 import pytest
+from motion_samples import SUPINE, getup_clip
 
 from getup_jax.motion.body import record
 from getup_jax.motion.bvh_writer import write_bvh
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.command import main
-from motion_samples import SUPINE, getup_clip
 
 
 @pytest.fixture
 def rise(tmp_path, character, cache):
     """A folder with one BVH file of a get-up."""
-    clip = getup_clip(character, SUPINE, still_s=0.6, rise_s=1.2)
+    clip = getup_clip(character, SUPINE, still_s=0.4, rise_s=0.8)
     folder = tmp_path / "in"
     folder.mkdir()
     write_bvh(record(clip, character), folder / "rise.bvh")
@@ -27,7 +27,7 @@ def test_import_list_events_and_plot(rise, tmp_path, capsys):
     clips = tmp_path / "clips"
     assert main(["import", str(rise), "--out", str(clips), "--json", str(report)]) == 0
     (entry,) = json.loads(report.read_text())
-    assert entry["frames"] == 72
+    assert entry["frames"] == 48
     assert entry["errors"] == []
     assert entry["position_error_m"] < 0.02
     (event,) = entry["events"]
@@ -48,15 +48,15 @@ def test_a_bad_file_is_reported_and_the_others_go_on(rise, tmp_path, capsys):
     bad, good = json.loads(report.read_text())
     assert "bad.bvh" in bad["errors"][0]
     assert bad["frames"] == 0
-    assert good["frames"] == 72
+    assert good["frames"] == 48
     assert "error: bad.bvh" in capsys.readouterr().out
 
 
 def test_a_short_file_needs_a_flag(rise, tmp_path, capsys):
     file = rise / "rise.bvh"
-    file.write_text(file.read_text().replace("Frames: 72", "Frames: 73"))
+    file.write_text(file.read_text().replace("Frames: 48", "Frames: 49"))
     assert main(["import", str(file)]) == 1
-    assert "header says 73 frames, file has 72 rows" in capsys.readouterr().out
+    assert "header says 49 frames, file has 48 rows" in capsys.readouterr().out
     assert main(["import", str(file), "--allow-short"]) == 0
     assert "warning" in capsys.readouterr().out
 

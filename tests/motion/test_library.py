@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from motion_samples import PRONE, SUPINE, getup_clip
 
 from getup_jax.config import MotionConfig
 from getup_jax.motion import library
@@ -13,7 +14,6 @@ from getup_jax.motion.cache import Job, key, read_npz, retarget_files, write_npz
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.readers import ReadOptions
 from getup_jax.motion.retarget import RetargetSettings
-from motion_samples import PRONE, SUPINE, getup_clip
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def folder(tmp_path_factory, character):
     """A folder with two get-ups as BVH files, and one cache for all tests here."""
     path = tmp_path_factory.mktemp("motions")
     for name, lying in (("back", SUPINE), ("front", PRONE)):
-        clip = getup_clip(character, lying, still_s=0.6, rise_s=1.2, name=name)
+        clip = getup_clip(character, lying, still_s=0.5, rise_s=1.1, name=name)
         write_bvh(record(clip, character), path / f"{name}.bvh")
     return path
 
@@ -89,7 +89,7 @@ def test_two_files_of_one_name(character, folder, tmp_path):
 def test_the_second_time_comes_from_the_cache(character, folder, monkeypatch):
     job = Job(folder / "back.bvh", character, ReadOptions(), RetargetSettings())
     (first,) = retarget_files([job], 1)
-    monkeypatch.setattr("getup_jax.motion.cache._run_worker", lambda job: pytest.fail("run again"))
+    monkeypatch.setattr("getup_jax.motion.cache.run_here", lambda job: pytest.fail("run again"))
     (second,) = retarget_files([job], 1)
     np.testing.assert_allclose(second[0].qpos, first[0].qpos, atol=1e-6)
     assert second[1] == first[1]

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from motion_samples import PRONE, getup_clip, random_pose
 from scipy.spatial.transform import Rotation
 
 from getup_jax.motion.body import body_of, record
@@ -15,7 +16,6 @@ from getup_jax.motion.readers import read_motion
 from getup_jax.motion.retarget import RetargetSettings, guess_unit, lift, retarget, starts_in_t_pose
 from getup_jax.motion.skeleton import cut, scaled
 from getup_jax.motion.solver import SolverSettings
-from motion_samples import PRONE, getup_clip, random_pose
 
 # Our own character as the source needs no scaling, and no pull away from the exact answer.
 EXACT = RetargetSettings(floor=0.0, solver=SolverSettings(previous=1e-9, rest=1e-9, tolerance=1e-6))
@@ -71,7 +71,7 @@ def test_joints_stay_inside_their_limits_and_turn_no_faster_than_they_may(charac
 def test_a_buried_body_is_lifted_out_of_the_floor(character):
     lying = getup_clip(character, PRONE, still_s=0.5, rise_s=1.0)
     sunk = lying.qpos.copy()
-    sunk[:20, 2] -= 0.1
+    sunk[:, 2] -= 0.1 * np.clip(np.linspace(2, -2, len(sunk)), 0, 1)
     clip, report = retarget(record(Clip("sunk", 30.0, sunk), character), character)
     assert report.penetration_m < 0.02
     assert np.abs(np.diff(clip.qpos[:, 2])).max() < 0.1
@@ -99,7 +99,7 @@ def test_standing_feet_are_put_on_the_floor(character):
 def test_the_rate_is_changed(character):
     clip = getup_clip(character, still_s=0.5, rise_s=0.5)
     fast = dataclasses.replace(record(clip, character), fps=60.0)
-    assert len(retarget(fast, character)[0].qpos) == len(clip.qpos) // 2
+    assert len(retarget(fast, character)[0].qpos) == len(clip.qpos[::2])
 
 
 def test_a_leading_t_pose_is_found_and_an_ordinary_start_is_not(character):

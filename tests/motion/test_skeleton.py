@@ -4,12 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from motion_samples import two_bones
 from scipy.spatial.transform import Rotation
 
 from getup_jax.motion import skeleton
 from getup_jax.motion.clips import MotionError
-
-from motion_samples import two_bones
 
 NONE = [1.0, 0, 0, 0]
 QUARTER_X = Rotation.from_euler("x", 90, degrees=True).as_quat(scalar_first=True)

@@ -20,7 +20,7 @@ import numpy as np
 
 from getup_jax.motion import readers
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.retarget import RetargetReport, RetargetSettings
+from getup_jax.motion.retarget import RetargetReport, RetargetSettings, retarget
 from getup_jax.paths import cache_dir
 from getup_jax.physics.character import CharacterSpec
 
@@ -52,10 +52,11 @@ def retarget_files(
     jobs: Sequence[Job], workers: int, done: Callable[[Path], None] = lambda path: None
 ) -> list[Result]:
     """One result a job, in order; a file that fails gives its error and stops no other."""
+    run = run_here if len(jobs) == 1 else _run_worker
 
     def one(job: Job) -> Result:
         try:
-            result: Result = load(job) or store(job, _run_worker(job))
+            result: Result = load(job) or store(job, run(job))
         except MotionError as error:
             result = error
         done(job.path)
@@ -146,6 +147,11 @@ def read_npz(file: Path, character: CharacterSpec) -> tuple[Clip, RetargetReport
         str(values["source"]),
     )
     return clip, RetargetReport(**report)
+
+
+def run_here(job: Job) -> tuple[Clip, RetargetReport]:
+    """Read and retarget in this process."""
+    return retarget(readers.read_motion(job.path, job.read), job.character, job.settings)
 
 
 def _run_worker(job: Job) -> tuple[Clip, RetargetReport]:

@@ -6,6 +6,7 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.table import Table
 
 from getup_jax.motion.cache import Result
@@ -94,20 +95,19 @@ def file_table(reports: list[FileReport]) -> Table:
 def getup_table(getups: tuple[GetUp, ...]) -> Table:
     """One row a get-up."""
     table = Table(title=f"{len(getups)} get-ups")
-    for name in ("name", "duration", "strategy", "start", "end", "fit (cm, deg, deg)"):
+    table.add_column("name", no_wrap=True, min_width=max((len(g.name) for g in getups), default=4))
+    for name in ("time\ns", "neck from\nto m", "fit error\ncm, deg, deg", "strategy"):
         table.add_column(name)
     for getup in getups:
-        first, last = getup.points[0], getup.points[-1]
         error = getup.fit_error
         fit = (
             "-"
             if error is None
-            else f"{100 * error[0]:.1f}, " + ", ".join(f"{57.3 * value:.1f}" for value in error[1:])
+            else f"{100 * error[0]:.0f}, "
+            + ", ".join(f"{np.degrees(value):.0f}" for value in error[1:])
         )
-        table.add_row(
-            *(getup.name, f"{getup.duration:.2f} s", getup.strategy or "-"),
-            *(f"{first[0]:.2f} m", f"{last[0]:.2f} m", fit),
-        )
+        neck = f"{getup.points[0, 0]:.2f} {getup.points[-1, 0]:.2f}"
+        table.add_row(getup.name, f"{getup.duration:.1f}", neck, fit, getup.strategy or "-")
     return table
 
 

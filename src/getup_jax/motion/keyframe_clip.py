@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
@@ -24,7 +26,7 @@ def clip_from_keyframes(
     qpos = _interpolate(motion.keyframes, times)
     planter = Planter(character)
     keys = motion.keyframes
-    for first, second in zip(keys[:-1], keys[1:], strict=True):
+    for first, second in itertools.pairwise(keys):
         inside = np.flatnonzero((times >= first.time) & (times <= second.time))
         qpos[inside] = _plant(qpos[inside], times[inside], (first, second), planter)
     qpos = np.stack([planter.rest_on_floor(q) for q in qpos])

@@ -72,7 +72,9 @@ def deepmimic_folder() -> Path:
 
 
 def _files(source: str) -> list[Path]:
-    path = deepmimic_folder() if source == DEEPMIMIC else Path(source).expanduser()
+    if source == DEEPMIMIC:  # its folder holds a quadruped's motions too
+        return sorted(deepmimic_folder().glob("humanoid3d_*.txt"))
+    path = Path(source).expanduser()
     if path.is_dir():
         files = motion_files(path)
         if not files:

@@ -79,7 +79,8 @@ class Planter:
         """The pose moved vertically until its lowest geom touches z = 0."""
         self._place(qpos)
         qpos = np.array(qpos, np.float64)
-        qpos[2] -= geom_bottoms(self._model, self._data).min()
+        data = self._data
+        qpos[2] -= geom_bottoms(self._model, data.geom_xpos, data.geom_xmat).min()
         return qpos
 
     def _place(self, qpos: np.ndarray) -> None:
@@ -109,24 +110,22 @@ class Planter:
         return self._data.xmat[self._bodies[name]].copy()
 
 
-def lowest_points(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
-    """Ids [G] and lowest points [G, 3] (m) of every colliding geom but the floor."""
+def geom_bottoms(model: mujoco.MjModel, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Height of the lowest point of every colliding geom but the floor, [..., S] (m).
+
+    position [..., G, 3] and rotation [..., G, 9] are MjData's geom_xpos and geom_xmat.
+    """
     solid = np.flatnonzero((model.geom_contype != 0) & (model.geom_bodyid != 0))
-    axes = data.geom_xmat[solid].reshape(-1, 3, 3)
-    size, kind = model.geom_size[solid], model.geom_type[solid][:, None]
-    down = -np.sign(axes[:, 2, :])
-    capsule = (axes[:, :, 2] * (down[:, 2] * size[:, 1])[:, None]) - size[:, :1] * [0, 0, 1]
-    box = np.einsum("gij,gj->gi", axes, down * size)
-    sphere = -size[:, :1] * [0, 0, 1]
-    is_capsule, is_box = kind == mujoco.mjtGeom.mjGEOM_CAPSULE, kind == mujoco.mjtGeom.mjGEOM_BOX
-    return solid, data.geom_xpos[solid] + np.where(
-        is_capsule, capsule, np.where(is_box, box, sphere)
+    up = np.abs(rotation[..., solid, 6:])  # each local axis' share of the vertical
+    size, kind = model.geom_size[solid], model.geom_type[solid]
+    capsule = up[..., 2] * size[:, 1] + size[:, 0]
+    box = np.sum(up * size, axis=-1)
+    extent = np.where(
+        kind == mujoco.mjtGeom.mjGEOM_CAPSULE,
+        capsule,
+        np.where(kind == mujoco.mjtGeom.mjGEOM_BOX, box, size[:, 0]),
     )
-
-
-def geom_bottoms(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """Height of the lowest point of every colliding geom but the floor, [G] (m)."""
-    return lowest_points(model, data)[1][:, 2]
+    return position[..., solid, 2] - extent
 
 
 def _turn_error(target: np.ndarray, current: np.ndarray) -> np.ndarray:
@@ -137,6 +136,6 @@ def _turn_error(target: np.ndarray, current: np.ndarray) -> np.ndarray:
 
 
 def _motion_cost(character: CharacterSpec) -> np.ndarray:
-    """What a unit of motion costs, [6 + J]: limbs move before the trunk, the trunk before the root."""
+    """Cost of motion, [6 + J]: limbs move before the trunk, and the trunk before the root."""
     trunk = np.array([name.startswith(("spine", "neck", "head")) for name in character.joint_names])
     return np.concatenate([np.full(3, 20.0), np.full(3, 20.0), np.where(trunk, 10.0, 1.0)])

@@ -32,6 +32,7 @@ def plot_getups(getups: Sequence[GetUp], character: CharacterSpec, file: Path) -
         _draw_class(row, name, values)
     for row, getup in zip(axes[len(classes) :], getups, strict=True):
         _draw_fit(row, getup, character)
+    axes[len(classes)][0].legend(fontsize=6)
     for axis, label in zip(axes[0], _LABELS, strict=True):
         axis.set_title(label)
     figure.tight_layout()
@@ -73,7 +74,7 @@ def _draw_fit(row: Any, getup: GetUp, character: CharacterSpec) -> None:
         values = clip_features(link_positions(getup.clip, character), character) * _SCALE
         times = np.arange(len(values)) / getup.clip.fps
         for column, axis in enumerate(row):
-            axis.plot(times, values[:, column], "k", linewidth=0.8, alpha=0.6)
+            axis.plot(times, values[:, column], "k", linewidth=0.8, alpha=0.6, label="clip")
     row[0].set_ylabel(f"{getup.name}\n{getup.strategy}", fontsize=6)
 
 

@@ -2,7 +2,7 @@
 
 Minimised per frame, over the root and the hinges inside their limits:
 
-    sum_l w_l |x_l - x*_l|^2 + v_l |log(R*_l R_l^T)|^2     link positions and orientations
+    sum_l w_l |x_l - x*_l|^2 + v_l |log(R*_l R_l^T)|^2     links to targets above the floor
     + g sum_p min(height_p, 0)^2                           hull points below the floor
     + a |q - q_previous|^2 + b |q - q_rest|^2              continuity, and a pull to rest
 """
@@ -23,6 +23,7 @@ from getup_jax.motion.targets import Targets
 
 _GRAM: Any = get_blas_funcs("syrk", dtype=np.float64)  # A A^T, lower half
 _SOLVE: Any = get_lapack_funcs("posv", dtype=np.float64)  # by Cholesky, from the lower half
+_NEAR_M = 0.15  # hull points above this height are not watched
 _HOLD = 1e6  # stiffness that holds a hinge at its limit, far above every weight
 
 
@@ -44,8 +45,8 @@ class SolverSettings:
         }
     )
     floor: float = 20.0  # per m of a hull point below the floor
-    previous: float = 1e-3  # per rad away from the last frame
-    rest: float = 1e-4  # per rad away from the neutral pose
+    previous: float = 5e-3  # per rad away from the last frame
+    rest: float = 3e-4  # per rad away from the neutral pose
     speed: float = 14.0  # rad/s; no hinge turns faster, which also bars flips through a gimbal
     iterations: int = 6  # at most, a frame
     first_iterations: int = 20  # rounds on the first frame, which has no last one
@@ -63,7 +64,8 @@ class FrameSolver:
         self.rest = np.clip(character.neutral_qpos[7:], self.lower, self.upper)
         self.low, self.high = self.lower, self.upper  # of the frame being solved
         self.reach = settings.speed / targets.fps  # rad, how far a hinge turns in a frame
-        self.wanted, self.turned = targets.position, targets.rotation
+        self.wanted, self.turned = targets.position.copy(), targets.rotation
+        self.wanted[..., 2] += targets.above
         self.untwist = _untwist(targets.rotation)
         self.jacobian = Jacobian(self.model, body.hull.link)
         self.scale = np.sqrt(_weights(targets, settings, len(character.link_names)))
@@ -105,11 +107,6 @@ class FrameSolver:
         ]
         rows = self.jacobian.links() * self.scale[:, None]
         right = np.concatenate(error) * self.scale
-        points, chosen, depth = self._under_floor()
-        if len(chosen):
-            weight = np.sqrt(settings.floor)
-            rows = np.concatenate([rows, weight * self.jacobian.heights(points, chosen)])
-            right = np.concatenate([right, weight * depth])
         hessian = _GRAM(1.0, rows.T, lower=1)
         gradient = right @ rows
         hessian.flat[:: len(hessian) + 1] += 1e-9
@@ -118,33 +115,41 @@ class FrameSolver:
         gradient[6:] += settings.rest * (self.rest - qpos[7:])
         return hessian, gradient
 
-    def _under_floor(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Hull points below the floor: places [k, 3], indices [k] and depths [k]."""
+    def _near_floor(self) -> tuple[np.ndarray, np.ndarray]:
+        """Heights [k] of the hull points that a step may push into the floor; rows [k, n]."""
         hull, data = self.body.hull, self.data
         up = data.xmat[1:, 6:][hull.link]
         height = data.xpos[1:, 2][hull.link] + (up * hull.point).sum(axis=1) - hull.radius
-        chosen = np.flatnonzero(height < 0)
-        link = hull.link[chosen]
+        near = np.flatnonzero(height < _NEAR_M)
+        link = hull.link[near]
         turn = data.xmat[1:][link].reshape(-1, 3, 3)
-        points = data.xpos[1:][link] + (turn @ hull.point[chosen][..., None])[..., 0]
-        return points, chosen, -height[chosen]
+        points = data.xpos[1:][link] + (turn @ hull.point[near][..., None])[..., 0]
+        return height[near], self.jacobian.heights(points, near)
 
     def _bounded_step(
         self, qpos: np.ndarray, hessian: np.ndarray, gradient: np.ndarray
     ) -> np.ndarray:
-        """The step with hinges that would leave their range held at its end."""
+        """The step that keeps hinges in their range and, softly, hull points off the floor.
+
+        What the free step would violate is added and the step solved again, since a penalty
+        on the points that are below now alone would let them bounce.
+        """
         low, high = self.low - qpos[7:], self.high - qpos[7:]
-        diagonal = np.arange(6, len(gradient))
-        held = np.zeros(len(low), bool)
-        step = _SOLVE(hessian, gradient, lower=1)[1]
-        for _ in range(3):
+        height, rows = self._near_floor()
+        held, pressed = np.zeros(len(low), bool), np.zeros(len(height), bool)
+        step = np.zeros(len(gradient))
+        for _ in range(4):
+            sinks = (height + rows @ step < 0) & ~pressed
             out = ((step[6:] < low - 1e-9) | (step[6:] > high + 1e-9)) & ~held
-            if not out.any():
+            if step.any() and not (sinks.any() or out.any()):
                 break
-            held |= out
-            at = diagonal[out]  # a stiff spring to the limit holds the hinge there
+            held, pressed = held | out, pressed | sinks
+            at = 6 + np.flatnonzero(out)  # a stiff spring to the limit holds the hinge there
             hessian[at, at] += _HOLD
             gradient[at] += _HOLD * np.clip(step[6:], low, high)[out]
+            weighted = self.settings.floor * rows[sinks]
+            hessian += weighted.T @ rows[sinks]
+            gradient -= height[sinks] @ weighted
             step = _SOLVE(hessian, gradient, lower=1)[1]
         step[6:] = np.clip(step[6:], low, high)
         return step

@@ -30,7 +30,8 @@ class Targets:
     """Wanted link poses of every frame; links that the recording lacks have weight 0."""
 
     fps: float
-    position: np.ndarray  # [F, L, 3] m
+    position: np.ndarray  # [F, L, 3] m, as recorded
+    above: np.ndarray  # [F, L] m, how much higher the link must be to stay above the floor
     rotation: np.ndarray  # [F, L, 3, 3] link to world
     names: dict[int, str]  # link index -> our name, for the links that have a target
 
@@ -51,6 +52,7 @@ def make_targets(
     targets = Targets(
         fps=recording.fps,
         position=np.zeros((recording.num_frames, count, 3)),
+        above=np.zeros((recording.num_frames, count)),
         rotation=np.tile(np.eye(3), (recording.num_frames, count, 1, 1)),
         names=names,
     )
@@ -59,6 +61,10 @@ def make_targets(
         targets.rotation[:, index] = rotation[link]
     level = _standing_level(targets, body) if floor is None else maker.scale * floor
     targets.position[..., 2] -= level
+    heights = hull_heights(targets.position, targets.rotation, body)
+    for index in names:
+        own = heights[:, body.hull.link == index]
+        targets.above[:, index] = np.maximum(-own.min(axis=1, initial=0.0), 0.0)
     return targets
 
 
@@ -174,15 +180,20 @@ def hull_heights(position: np.ndarray, rotation: np.ndarray, body: Body) -> np.n
 
 
 def _standing_level(targets: Targets, body: Body) -> float:
-    """Height of the lower sole while the character stands, on flat feet where it does."""
-    heights = hull_heights(targets.position, targets.rotation, body)
+    """Height of the floor under a flat foot while the character stands.
+
+    Measured at the ankle: a sole's edge dips below the floor when a flat foot tilts a little.
+    """
     feet = [body.links["foot_l"], body.links["foot_r"]]
-    soles = np.stack([heights[:, body.hull.link == foot].min(axis=1) for foot in feet], axis=1)
-    lower = soles.argmin(axis=1)
-    sole = soles.min(axis=1)
-    size = targets.position[:, body.links["pelvis"], 2] - sole
+    hull = body.hull
+    soles = [hull.link == foot for foot in feet]
+    depths = [(hull.radius - hull.point[:, 2])[sole].max() for sole in soles]
+    below = targets.position[:, feet, 2] - np.array(depths)  # [F, 2]
+    lower = below.argmin(axis=1)[:, None]
+    level = below.min(axis=1)
+    size = targets.position[:, body.links["pelvis"], 2] - level
     standing = size > 0.85 * np.percentile(size, 98)
-    up = np.stack([targets.rotation[:, foot, 2, 2] for foot in feet], axis=1)
-    flat = standing & (np.take_along_axis(up, lower[:, None], axis=1)[:, 0] > _FLAT_COSINE)
+    up = np.take_along_axis(targets.rotation[:, feet, 2, 2], lower, axis=1)[:, 0]
+    flat = standing & (up > _FLAT_COSINE)
     enough = flat.sum() > 0.1 * standing.sum()
-    return float(np.percentile(sole[flat if enough else standing], 20))
+    return float(np.percentile(level[flat if enough else standing], 20))

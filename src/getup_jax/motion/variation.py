@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from getup_jax.motion.clips import GetUp
 from getup_jax.motion.planting import geom_bottoms
@@ -30,9 +30,9 @@ def authored_poses(
     clips = [getup.clip.qpos for getup in getups if getup.clip is not None]
     if not clips:
         raise ValueError("authored_poses: no get-up has a clip; pass those of load_authored")
-    frames = np.concatenate([side for qpos in clips for side in (qpos, character.mirror(qpos))])
-    extra = max(count - len(frames), 0)
     clips = [side for qpos in clips for side in (qpos, character.mirror(qpos))]
+    frames = np.concatenate(clips)
+    extra = max(count - len(frames), 0)
     drawn, owner = _draw(clips, extra, rng)
     other = _partner(drawn, owner, clips, rng)
     share = rng.uniform(0.0, _LARGEST_SHARE, (extra, 1))
@@ -62,8 +62,9 @@ def _partner(
     frames = np.concatenate(clips)
     motion = np.repeat(np.arange(len(clips)) // 2, [len(qpos) for qpos in clips])
     scale = 1.0 / np.sqrt(poses.shape[1] - 7)
-    tree = cKDTree(_likeness(frames, scale))
-    distance, index = tree.query(_likeness(poses, scale), k=min(_NEIGHBOURS, len(frames)))
+    tree = KDTree(_likeness(frames, scale))
+    nearest = tree.query(_likeness(poses, scale), k=min(_NEIGHBOURS, len(frames)))
+    distance, index = (np.asarray(table) for table in nearest)
     pick = rng.integers(index.shape[1], size=len(poses))
     rows = np.arange(len(poses))
     chosen = index[rows, pick]
@@ -102,9 +103,13 @@ def _face_like(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def _on_floor(poses: np.ndarray, character: CharacterSpec) -> np.ndarray:
-    data = mujoco.MjData(character.model)
-    for qpos in poses:
+    model, data = character.model, mujoco.MjData(character.model)
+    position = np.empty((len(poses), model.ngeom, 3))
+    rotation = np.empty((len(poses), model.ngeom, 9))
+    for row, qpos in enumerate(poses):
         data.qpos[:] = qpos
-        mujoco.mj_kinematics(character.model, data)
-        qpos[2] -= geom_bottoms(character.model, data).min()
-    return poses
+        mujoco.mj_kinematics(model, data)
+        position[row], rotation[row] = data.geom_xpos, data.geom_xmat
+    lifted = poses.copy()
+    lifted[:, 2] -= geom_bottoms(model, position, rotation).min(axis=-1)
+    return lifted

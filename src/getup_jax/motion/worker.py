@@ -10,10 +10,8 @@ import sys
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-from getup_jax.motion.cache import Job, Result  # noqa: E402
+from getup_jax.motion.cache import Job, Result, run_here  # noqa: E402
 from getup_jax.motion.clips import MotionError  # noqa: E402
-from getup_jax.motion.readers import read_motion  # noqa: E402
-from getup_jax.motion.retarget import retarget  # noqa: E402
 
 
 def main() -> None:
@@ -22,7 +20,7 @@ def main() -> None:
     sys.stdout = sys.stderr  # whatever prints must not break the answer
     job: Job = pickle.load(sys.stdin.buffer)
     try:
-        result: Result = retarget(read_motion(job.path, job.read), job.character, job.settings)
+        result: Result = run_here(job)
     except MotionError as error:
         result = error
     pickle.dump(result, output)

@@ -13,7 +13,7 @@ import numpy as np
 from getup_jax.nets import prior as pose_prior
 from getup_jax.nets.prior import PosePrior
 from getup_jax.nets.prior_data import pose_conditions
-from getup_jax.nets.prior_training import limit_check, random_latents, rmse_deg
+from getup_jax.nets.prior_training import decode_random, limit_check, rmse_deg
 from getup_jax.physics.character import CharacterSpec
 
 DEEP_M = 0.02  # a penetration of more than this counts
@@ -67,7 +67,7 @@ def evaluate_prior(
     angles, c = jnp.asarray(poses[:, 7:], jnp.float32), jnp.asarray(condition)
     decode, encode = jax.jit(pose_prior.decode), jax.jit(pose_prior.encode)
     decoded = decode(prior, encode(prior, angles, c), c)
-    random = decode(prior, random_latents(prior, len(poses), seed), c)
+    random = decode_random(prior, condition, np.random.default_rng(seed))
     return PriorEvaluation(
         num_poses=len(poses),
         rmse_deg=rmse_deg(prior, angles, c),

@@ -25,7 +25,7 @@ from getup_jax.nets.prior_data import PoseSet, split
 Progress = Callable[[int, int, dict[str, float]], None]
 
 PROGRESS_CALLS = 20  # of one training
-NUM_RANDOM_LATENTS = 4096
+NUM_RANDOM_POSES = 4096
 
 # rad. Poses at a limit are decoded with an error of this size, which says nothing about the prior.
 LIMIT_TOLERANCE = 0.05
@@ -96,29 +96,37 @@ def train_prior(
         joint_lower=jnp.asarray(poses.joint_lower),
         joint_upper=jnp.asarray(poses.joint_upper),
     )
-    drawn = np.random.default_rng(config.seed).integers(len(train[0]), size=NUM_RANDOM_LATENTS)
-    latent = random_latents(prior, NUM_RANDOM_LATENTS, config.seed)
-    random = jax.jit(pose_prior.decode)(prior, latent, train[1][drawn])
+    seconds = time.perf_counter() - start
+    rng = np.random.default_rng(config.seed)
+    random = random_poses(prior, poses.condition, NUM_RANDOM_POSES, rng)
     report = PriorReport(
         num_poses=len(train[0]),
         num_heldout=len(heldout[0]),
         epochs=epochs,
         updates=updates,
-        seconds=time.perf_counter() - start,
+        seconds=seconds,
         train_rmse_deg=rmse_deg(prior, *train),
         heldout_rmse_deg=rmse_deg(prior, *heldout),
         mean_kl=float(_mean_kl(prior, *heldout)),
-        active_latents=int(jnp.sum(prior.latent_std > MIN_LATENT_STD)),
+        active_latents=int(jnp.sum(latent_std > MIN_LATENT_STD)),
         pca_variance=pca_variance(np.asarray(train[0]), config.latent_size),
         **limit_check(prior, random),
     )
     return prior, report
 
 
-def random_latents(prior: PosePrior, count: int, seed: int) -> jax.Array:
-    """Latents drawn from N(latent_mean, latent_std), [count, Z]."""
-    noise = np.random.default_rng(seed).standard_normal((count, prior.latent_size), np.float32)
-    return prior.latent_mean + prior.latent_std * noise
+def random_poses(
+    prior: PosePrior, condition: np.ndarray, count: int, rng: np.random.Generator
+) -> jax.Array:
+    """Joint angles [count, J] of random latents under rows of condition [N, 3] drawn at random."""
+    rows = condition[rng.integers(len(condition), size=count)]
+    return decode_random(prior, rows, rng)
+
+
+def decode_random(prior: PosePrior, condition: np.ndarray, rng: np.random.Generator) -> jax.Array:
+    """Joint angles [N, J] of latents drawn from N(latent_mean, latent_std) under [N, 3]."""
+    action = rng.standard_normal((len(condition), prior.latent_size), np.float32)
+    return jax.jit(pose_prior.decode_action)(prior, jnp.asarray(action), jnp.asarray(condition))
 
 
 def limit_check(prior: PosePrior, angles: jax.Array) -> dict[str, float]:

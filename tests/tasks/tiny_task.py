@@ -1,0 +1,87 @@
+"""A get-up task that is made in a moment: hand-made styles, an untrained pose prior."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from getup_jax.config import Config, PhysicsConfig, TaskConfig
+from getup_jax.motion.clips import Clip, GetUp
+from getup_jax.motion.curves import NUM_POINTS
+from getup_jax.nets.cvae import CVAE, init_variables
+from getup_jax.nets.mlp import OUTPUT_LAYER
+from getup_jax.nets.prior import PosePrior
+from getup_jax.nets.prior_data import pose_conditions
+from getup_jax.physics.character import CharacterSpec
+from getup_jax.tasks.build import BuiltTask, assemble
+
+LATENT = 16
+CLIP_SECONDS = 1.0
+CONFIG = Config(
+    physics=PhysicsConfig(engine="native"),
+    task=TaskConfig(stand_start=0.3, clip_start=0.2, pool_size=24, settle_s=0.2),
+)
+
+
+def supine(character: CharacterSpec) -> np.ndarray:
+    """The neutral pose [7 + J] on its back, head along -x."""
+    pose = character.neutral_qpos.copy()
+    pose[:3] = 0.0, 0.0, 0.12
+    pose[3:7] = Rotation.from_rotvec([0.0, -np.pi / 2, 0.0]).as_quat(scalar_first=True)
+    return pose
+
+
+def getups(character: CharacterSpec) -> list[GetUp]:
+    """One style with a clip of three frames, and one that is a curve alone."""
+    sitting = character.neutral_qpos.copy()
+    sitting[2] = 0.5
+    sitting[3:7] = Rotation.from_rotvec([0.0, -np.pi / 4, 0.0]).as_quat(scalar_first=True)
+    qpos = np.stack([supine(character), sitting, character.neutral_qpos])
+    clip = Clip("tip up", fps=2 / CLIP_SECONDS, qpos=qpos)
+    ends = pose_conditions(qpos[[0, -1]], character)
+    points = np.linspace(ends[0], ends[1], NUM_POINTS)
+    return [
+        GetUp("clip", duration=CLIP_SECONDS, points=points, clip=clip),
+        GetUp("curve", duration=2 * CLIP_SECONDS, points=points, clip=None),
+    ]
+
+
+def untrained_prior(character: CharacterSpec, seed: int = 0) -> PosePrior:
+    """A pose prior with random weights."""
+    model = CVAE(num_joints=character.num_joints, latent_size=LATENT, hidden_sizes=(32,))
+    rng = np.random.default_rng(seed)
+    angles = character.neutral_qpos[7:] + 0.1 * rng.normal(size=(64, 49))
+    variables = init_variables(
+        model,
+        jax.random.PRNGKey(seed),
+        jnp.asarray(angles, jnp.float32),
+        jnp.asarray(rng.normal(size=(64, 3)), jnp.float32),
+    )
+    return PosePrior(
+        variables=variables,
+        latent_mean=jnp.asarray(rng.normal(size=LATENT), jnp.float32),
+        latent_std=jnp.asarray(rng.uniform(0.5, 2.0, LATENT), jnp.float32),
+        joint_lower=jnp.asarray(character.joint_lower, jnp.float32),
+        joint_upper=jnp.asarray(character.joint_upper, jnp.float32),
+    )
+
+
+def neutral_prior(character: CharacterSpec) -> PosePrior:
+    """A pose prior that decodes every latent to the neutral pose."""
+    prior = untrained_prior(character)
+    params, statistics = prior.variables["params"], prior.variables["statistics"]
+    output = jax.tree.map(jnp.zeros_like, params["decoder"][OUTPUT_LAYER])
+    neutral = jnp.asarray(character.neutral_qpos[7:], jnp.float32)
+    return prior.replace(
+        variables={
+            "params": {**params, "decoder": {**params["decoder"], OUTPUT_LAYER: output}},
+            "statistics": {**statistics, "angle_mean": neutral},
+        }
+    )
+
+
+def tiny_task(character: CharacterSpec, config: Config = CONFIG) -> BuiltTask:
+    log: list[str] = []
+    return assemble(config, character, getups(character), neutral_prior(character), log.append)
