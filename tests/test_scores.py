@@ -123,6 +123,12 @@ def test_return_rate_divides_by_the_full_episode():
     np.testing.assert_allclose(values(trace)["return_rate"], [0.75, 0.125])
 
 
+def test_full_episodes_have_the_steps_that_the_task_gives_them():
+    # the task truncates at the control step nearest to the end: the fourth of 0.5 s for 2.1 s
+    trace = make_trace(np.ones((4, 1)), duration=np.full((4, 1), 1.1))
+    np.testing.assert_allclose(values(trace)["return_rate"], [1.0])
+
+
 def test_torque_and_energy():
     torque, qvel = np.zeros((2, 2, 2)), np.zeros((2, 2, 8))
     torque[:, 0] = [3.0, -1.0]

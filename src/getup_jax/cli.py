@@ -130,6 +130,8 @@ def _eval_parser() -> argparse.ArgumentParser:
     add("--seed", type=int, default=0, metavar="S", help="of the starts (default: 0)")
     add("--json", type=Path, metavar="FILE", help="write the results to this file, too")
     add("--video", type=Path, metavar="FILE", help="film some episodes; an .mp4 file")
+    add("--start", choices=("lying", "standing"), default="lying", help="(default: lying)")
+    add("--stand-time", type=float, metavar="S", help="seconds of standing (default: as trained)")
     add("--engine", metavar="E", help="native, mjx or mjx-warp (default: as for training)")
     return parser
 

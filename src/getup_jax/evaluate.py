@@ -22,7 +22,7 @@ from getup_jax.nets import prior as pose_prior
 from getup_jax.scores import score, table, to_json
 from getup_jax.storage import from_nested
 from getup_jax.tasks.build import BuiltTask, build_task
-from getup_jax.tasks.episode import LYING, EpisodeState
+from getup_jax.tasks.episode import LYING, STANDING, EpisodeState
 
 BATCH = 256  # episodes simulated at once
 Log = Callable[[str], None]
@@ -48,13 +48,14 @@ def evaluate_command(args: argparse.Namespace) -> int:
     """The command line of `getup-eval`; returns the exit code."""
     begin = time.monotonic()
     loaded = checkpoint.load_policy(args.ckpt)
-    config = evaluation_config(loaded.config, args.engine, args.seed, args.episodes)
+    config = evaluation_config(loaded.config, args)
     print(f"{loaded.path}: {loaded.metadata.get('steps', 0):,} steps of training", flush=True)
     task = build_task(config, _say, pose_prior.from_dict(loaded.prior))
     learner = _learner(config, task)
     template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0)).policy
     policy = from_nested(template, loaded.policy, str(loaded.path))
-    trace, getup = run_episodes(task, learner, policy, args.episodes, args.seed, _say)
+    kind = STANDING if args.start == "standing" else LYING
+    trace, getup = run_episodes(task, learner, policy, args.episodes, args.seed, kind, _say)
     env = task.environment
     scores = score(trace, getup, task.getups, env.engine.control_dt, config.task.stand_time_s)
     print(table(scores))
@@ -69,22 +70,33 @@ def evaluate_command(args: argparse.Namespace) -> int:
     return 0
 
 
-def evaluation_config(config: Config, engine: str | None, seed: int, episodes: int) -> Config:
-    """The training config with lying starts only, as many as there are episodes."""
-    physics = config.physics
-    if engine is not None:
-        solver = (
-            "newton" if engine.startswith("mjx") and physics.solver == "pgs" else physics.solver
-        )
-        physics = dataclasses.replace(physics, engine=engine, solver=solver)
-    task = dataclasses.replace(config.task, stand_start=0.0, clip_start=0.0, pool_size=episodes)
-    return dataclasses.replace(config, physics=physics, task=task, seed=seed)
+def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
+    """The training config with one kind of start only, as many as there are episodes."""
+    physics, task = config.physics, config.task
+    if args.engine is not None:
+        solver = "auto" if physics.solver == "pgs" else physics.solver  # MJX has no PGS
+        physics = dataclasses.replace(physics, engine=args.engine, solver=solver)
+    stand_time_s = task.stand_time_s if args.stand_time is None else args.stand_time
+    task = dataclasses.replace(
+        task,
+        stand_start=float(args.start == "standing"),
+        clip_start=0.0,
+        pool_size=args.episodes,
+        stand_time_s=stand_time_s,
+    )
+    return dataclasses.replace(config, physics=physics, task=task, seed=args.seed)
 
 
 def run_episodes(
-    task: BuiltTask, learner: Learner, policy: Any, episodes: int, seed: int, log: Log
+    task: BuiltTask,
+    learner: Learner,
+    policy: Any,
+    episodes: int,
+    seed: int,
+    kind: int,
+    log: Log,
 ) -> tuple[Trace, np.ndarray]:
-    """One lying start each: the styles in turn, the rows of the pool by the seed.
+    """One start of the given kind each: the styles in turn, the rows of the pool by the seed.
 
     Returns the trace, leaves [T, N, ...] as NumPy arrays, and the style [N] of every episode.
     """
@@ -92,31 +104,41 @@ def run_episodes(
     getup = np.arange(episodes) % num_styles
     row = np.random.default_rng(seed).integers(rows, size=episodes)
     size = min(BATCH, episodes)
-    roll = jax.jit(_roll, static_argnums=(0, 1, 2))
-    length = episode_steps(task)
+    roll = jax.jit(_roll, static_argnums=(0, 1, 2, 3))
+    length = episode_steps(task, kind)
     parts = []
     for first in range(0, episodes, size):
         # the last batch is filled up, so that one program serves all of them
         index = np.minimum(np.arange(first, first + size), episodes - 1)
-        part = roll(task.environment, learner, length, task.world, policy, getup[index], row[index])
+        part = roll(
+            task.environment, learner, length, kind, task.world, policy, getup[index], row[index]
+        )
         keep = min(size, episodes - first)
         parts.append(jax.tree.map(lambda x, keep=keep: np.asarray(x)[:, :keep], part))
         log(f"{min(first + size, episodes)} of {episodes} episodes")
     return jax.tree.map(lambda *x: np.concatenate(x, axis=1), *parts), getup
 
 
-def episode_steps(task: BuiltTask) -> int:
+def episode_steps(task: BuiltTask, kind: int) -> int:
     """Control steps of the longest episode."""
-    longest = float(np.max(np.asarray(task.world.duration)))
-    total = longest + task.environment.config.stand_time_s
+    rise = float(np.max(np.asarray(task.world.duration))) if kind == LYING else 0.0
+    total = rise + task.environment.config.stand_time_s
     return math.ceil(total / task.environment.engine.control_dt)
 
 
 def _roll(
-    env: Any, learner: Learner, length: int, world: Any, policy: Any, getup: Any, row: Any
+    env: Any,
+    learner: Learner,
+    length: int,
+    kind: int,
+    world: Any,
+    policy: Any,
+    getup: Any,
+    row: Any,
 ) -> Trace:
-    kind = jnp.full(len(getup), LYING, jnp.int32)
-    state = env.start(world, jnp.asarray(getup, jnp.int32), kind, jnp.asarray(row))
+    kinds = jnp.full(len(getup), kind, jnp.int32)
+    state = env.start(world, jnp.asarray(getup, jnp.int32), kinds, jnp.asarray(row))
+    verdict = "stand_success" if kind == STANDING else "success"
 
     def step(carry: tuple[EpisodeState, jax.Array], _: None) -> tuple[Any, Trace]:
         state, running = carry
@@ -131,7 +153,7 @@ def _roll(
             torque=kinematics.torque,
             task_reward=output.metrics["reward_task"],
             running=running,
-            success=running & (output.episode["success"] == 1.0),
+            success=running & (output.episode[verdict] == 1.0),
             duration=state.duration,
         )
         return (state, running & ~(output.terminated | output.truncated)), trace

@@ -61,7 +61,7 @@ def episode_values(trace: Any, control_dt: float, stand_time_s: float) -> dict[s
     rate = trace.qvel[..., 6:]
     jerk = np.abs(np.diff(rate, n=2, axis=0)).mean(axis=-1) / control_dt**2
     success = trace.success.any(axis=0)
-    full_steps = np.ceil((trace.duration[0] + stand_time_s) / control_dt)
+    full_steps = np.round((trace.duration[0] + stand_time_s) / control_dt)
     return {
         "success": success.astype(float),
         "return_rate": np.where(running, trace.task_reward, 0.0).sum(axis=0) / full_steps,
@@ -117,7 +117,10 @@ def table(scores: Scores) -> str:
         "angle_error_rad": "{:.2f}", "stand_time_s": "{:.1f}", "jitter": "{:.0f}",
         "torque_nm": "{:.1f}", "energy_j": "{:.0f}", "episodes": "{:d}",
     }  # fmt: skip
-    view = Table("get-up", *(name.replace("_", " ") for name in columns))
+    view = Table()
+    view.add_column("get-up", no_wrap=True)
+    for name in columns:
+        view.add_column(name.replace("_", " "))
     for name, row in {**(scores.per_curve or {}), "all": scores}.items():
         if name == "all":
             view.add_section()
@@ -128,7 +131,7 @@ def table(scores: Scores) -> str:
         ]
         view.add_row(name, *cells)
     out = io.StringIO()
-    Console(file=out, width=140).print(view)
+    Console(file=out, width=170).print(view)
     return out.getvalue()
 
 

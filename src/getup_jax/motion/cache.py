@@ -26,7 +26,7 @@ from getup_jax.physics.character import CharacterSpec
 
 # Code whose change makes other clips out of the same files.
 _CODE = (
-    *("asf_amc", "body", "bvh", "bvh_header", "calibrate", "composite_json", "deepmimic"),
+    *("asf_amc", "axes", "body", "bvh", "bvh_header", "calibrate", "composite_json", "deepmimic"),
     *("jacobian", "names", "readers", "retarget", "skeleton", "solver", "targets"),
 )
 _SHAPE = (

@@ -1,9 +1,13 @@
-"""How links and points of a character move with its root and hinges, fast for one pose."""
+"""How links and points of a character move with its root and hinges, and how far they turn.
+
+All of it is written for speed on one pose: the solver calls it thousands of times.
+"""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 
 class Jacobian:
@@ -46,6 +50,23 @@ class Jacobian:
         rows[:, 2] = 1.0
         rows[:, 3:] = (points @ self.cross[:, 2] - self.offset[2]) * self.point_moves[chosen]
         return rows
+
+
+def untwist(rotation: np.ndarray) -> np.ndarray:
+    """[F, L, 4, 4] that take a link's quaternion to target times its inverse."""
+    flat = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    w, x, y, z = flat.T
+    rows = [[w, x, y, z], [x, -w, z, -y], [y, -z, -w, x], [z, y, -x, -w]]
+    return np.moveaxis(np.array(rows), -1, 0).reshape(*rotation.shape[:2], 4, 4)
+
+
+def rotation_vectors(factors: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
+    """World rotation vectors [L, 3] from links [L, 4] to their targets."""
+    error = (factors @ quaternion[..., None])[..., 0]
+    error *= np.where(error[:, :1] < 0, -1.0, 1.0)
+    sine = np.linalg.norm(error[:, 1:], axis=1)
+    angle = 2.0 * np.arctan2(sine, error[:, 0])
+    return error[:, 1:] * (angle / np.maximum(sine, 1e-9))[:, None]
 
 
 def _moves(model: mujoco.MjModel) -> np.ndarray:

@@ -15,10 +15,9 @@ from typing import Any
 import mujoco
 import numpy as np
 from scipy.linalg import get_blas_funcs, get_lapack_funcs
-from scipy.spatial.transform import Rotation
 
 from getup_jax.motion.body import Body
-from getup_jax.motion.jacobian import Jacobian
+from getup_jax.motion.jacobian import Jacobian, rotation_vectors, untwist
 from getup_jax.motion.targets import Targets
 
 _GRAM: Any = get_blas_funcs("syrk", dtype=np.float64)  # A A^T, lower half
@@ -66,7 +65,7 @@ class FrameSolver:
         self.reach = settings.speed / targets.fps  # rad, how far a hinge turns in a frame
         self.wanted, self.turned = targets.position.copy(), targets.rotation
         self.wanted[..., 2] += targets.above
-        self.untwist = _untwist(targets.rotation)
+        self.untwist = untwist(targets.rotation)
         self.jacobian = Jacobian(self.model, body.hull.link)
         self.scale = np.sqrt(_weights(targets, settings, len(character.link_names)))
 
@@ -103,7 +102,7 @@ class FrameSolver:
         self.jacobian.move_to(data)
         error = [
             (self.wanted[frame] - data.xpos[1:]).ravel(),
-            _rotation_vectors(self.untwist[frame], data.xquat[1:]).ravel(),
+            rotation_vectors(self.untwist[frame], data.xquat[1:]).ravel(),
         ]
         rows = self.jacobian.links() * self.scale[:, None]
         right = np.concatenate(error) * self.scale
@@ -173,23 +172,6 @@ def _weights(targets: Targets, settings: SolverSettings, count: int) -> np.ndarr
         limb = name.partition("_")[0]
         position[index], rotation[index] = settings.position[limb], settings.rotation[limb]
     return np.repeat(np.concatenate([position, rotation]), 3)
-
-
-def _untwist(rotation: np.ndarray) -> np.ndarray:
-    """[F, L, 4, 4] that take a link's quaternion to target times its inverse."""
-    flat = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    w, x, y, z = flat.T
-    rows = [[w, x, y, z], [x, -w, z, -y], [y, -z, -w, x], [z, y, -x, -w]]
-    return np.moveaxis(np.array(rows), -1, 0).reshape(*rotation.shape[:2], 4, 4)
-
-
-def _rotation_vectors(untwist: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
-    """World rotation vectors [L, 3] from links [L, 4] to their targets."""
-    error = (untwist @ quaternion[..., None])[..., 0]
-    error *= np.where(error[:, :1] < 0, -1.0, 1.0)
-    sine = np.linalg.norm(error[:, 1:], axis=1)
-    angle = 2.0 * np.arctan2(sine, error[:, 0])
-    return error[:, 1:] * (angle / np.maximum(sine, 1e-9))[:, None]
 
 
 def _apply(qpos: np.ndarray, step: np.ndarray) -> None:
