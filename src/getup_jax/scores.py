@@ -61,7 +61,8 @@ def episode_values(trace: Any, control_dt: float, stand_time_s: float) -> dict[s
     rate = trace.qvel[..., 6:]
     jerk = np.abs(np.diff(rate, n=2, axis=0)).mean(axis=-1) / control_dt**2
     success = trace.success.any(axis=0)
-    full_steps = np.round((trace.duration[0] + stand_time_s) / control_dt)
+    start = trace.time[0] - control_dt  # a standing start begins at the curve's end
+    full_steps = np.round((trace.duration[0] + stand_time_s - start) / control_dt)
     return {
         "success": success.astype(float),
         "return_rate": np.where(running, trace.task_reward, 0.0).sum(axis=0) / full_steps,
