@@ -134,11 +134,9 @@ def make_prior(config: Config, character: CharacterSpec) -> PosePrior:
     rng, joints, latent = np.random.default_rng(0), character.num_joints, config.prior.latent_size
     poses = character.neutral_qpos[7:] + POSE_STD_RAD * rng.normal(size=(256, joints))
     conditions = rng.normal(1.0, 0.5, (256, 3))
-    variables = init_variables(
-        CVAE(joints, latent, config.prior.hidden_sizes, config.prior.conditional),
-        jax.random.PRNGKey(0),
-        jnp.asarray(poses, jnp.float32),
-        jnp.asarray(conditions, jnp.float32),
+    model = CVAE(joints, latent, config.prior.hidden_sizes, config.prior.conditional)
+    variables = jax.jit(lambda key: init_variables(model, key, poses, conditions))(
+        jax.random.PRNGKey(0)
     )
     return PosePrior(
         variables=variables,

@@ -20,7 +20,7 @@ def shortest_turn(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     a, b = start / np.linalg.norm(start), end / np.linalg.norm(end)
     axis, cosine = np.cross(a, b), float(a @ b)
     if cosine < -1 + 1e-9:  # opposite: half a turn about any axis across
-        across = np.cross(a, [1.0, 0.0, 0.0]) + np.cross(a, [0.0, 1.0, 0.0])
+        across = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
         across = across / np.linalg.norm(across)
         return 2 * np.outer(across, across) - np.eye(3)
     x, y, z = axis

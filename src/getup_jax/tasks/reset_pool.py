@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
@@ -15,10 +15,12 @@ from getup_jax.config import ConfigError, TaskConfig
 from getup_jax.motion.clips import Clip, GetUp
 from getup_jax.motion.features import FeatureLinks, features
 from getup_jax.physics.character import CharacterSpec
+from getup_jax.physics.settle import lift_to_ground, settle
 from getup_jax.tasks.episode import CLIP, STANDING
-from getup_jax.types import Engine, PhysicsState, take
+from getup_jax.types import Engine, PhysicsState
 
-_SETTLE_LIFT_M = 0.01  # poses are dropped from this height
+_DROP_M = 0.01  # lying poses are dropped from this height
+_SINK_M = 0.001  # the others touch the ground, as a body at rest does
 
 _Start = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -52,7 +54,10 @@ def build_pool(
             offset += count
     qpos, qvel, time = (np.concatenate(part) for part in zip(*starts, strict=True))
     lying = np.repeat([True, False, False], [len(getups) * count for count in counts])
-    physics = _settle(engine, character, qpos, qvel, lying, config.settle_s)
+    qpos[lying] = lift_to_ground(character, qpos[lying], _DROP_M)
+    qpos[lying], qvel[lying] = settle(character, qpos[lying], config.settle_s)
+    qpos[~lying] = lift_to_ground(character, qpos[~lying], -_SINK_M)
+    physics = engine.place(qpos, qvel)
     _check_finite(physics, qpos)
     return Pool(physics=physics, time=jnp.asarray(time, jnp.float32), table=jnp.asarray(table))
 
@@ -130,46 +135,6 @@ def angle_gap(qpos: np.ndarray, getup: GetUp, character: CharacterSpec) -> float
     mujoco.mj_kinematics(character.model, data)
     value = np.asarray(features(FeatureLinks.of(character), jnp.asarray(data.xpos[1:]), 0.0))
     return float(np.abs(value[1:] - getup.points[0, 1:]).max())
-
-
-def lift_to_ground(character: CharacterSpec, qpos: np.ndarray, gap_m: float) -> np.ndarray:
-    """Poses [P, 7 + J] moved up or down until their lowest point is gap_m above z = 0."""
-    model, data, qpos = character.model, mujoco.MjData(character.model), qpos.copy()
-    floor = [i for i in range(model.ngeom) if model.geom_bodyid[i] == 0]
-    body = [i for i in range(model.ngeom) if model.geom_bodyid[i] > 0 and model.geom_contype[i]]
-    for row in qpos:
-        data.qpos[:] = row
-        mujoco.mj_kinematics(model, data)
-        far = 10.0
-        lowest = min(mujoco.mj_geomDistance(model, data, floor[0], g, far, None) for g in body)
-        row[2] += gap_m - lowest
-    return qpos
-
-
-def _settle(
-    engine: Engine,
-    character: CharacterSpec,
-    qpos: np.ndarray,
-    qvel: np.ndarray,
-    lying: np.ndarray,
-    seconds: float,
-) -> PhysicsState:
-    """Let the lying rows come to rest under their own servos; the others stay as they are."""
-    qpos = qpos.copy()
-    qpos[lying] = lift_to_ground(character, qpos[lying], _SETTLE_LIFT_M)
-    qpos[~lying] = lift_to_ground(character, qpos[~lying], -0.001)
-    state = engine.place(qpos, qvel)
-    steps = round(seconds / engine.control_dt)
-    if steps == 0:
-        return state
-    step: Callable[[PhysicsState, jax.Array], PhysicsState] = jax.jit(engine.step)
-    rested = state
-    for _ in range(steps):
-        rested = step(rested, jnp.asarray(qpos[:, 7:], jnp.float32))
-    keep = jnp.asarray(lying) & rested.kinematics.finite
-    order = jnp.where(keep, jnp.arange(len(qpos)), jnp.arange(len(qpos)) + len(qpos))
-    both = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), rested, state)
-    return take(both, order)
 
 
 def _check_finite(physics: PhysicsState, qpos: np.ndarray) -> None:
