@@ -53,7 +53,9 @@ from getup_jax.nets.prior_data import pose_conditions
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.settings import load_config
 from getup_jax.tasks.build import BuiltTask, assemble
-from getup_jax.types import PhysicsState
+from getup_jax.tasks.episode import EpisodeState
+from getup_jax.tasks.getup import GetUpTask
+from getup_jax.types import PhysicsState, StepOutput
 
 NUM_STEPS = 8  # short, so that many rounds fit; rates do not depend on it
 MIN_ROUNDS = 3
@@ -69,7 +71,7 @@ def main() -> None:
     learner = make_learner(
         task.environment, config.network, config.ppo, total_steps=config.train.total_steps
     )
-    state = learner.init(task.world, jax.random.PRNGKey(config.seed))
+    state = jax.jit(learner.init)(task.world, jax.random.PRNGKey(config.seed))
     parts = make_parts(config, task, learner, state)
     seconds = measure(parts, args.seconds)
     result = report(config, task, seconds)
@@ -85,7 +87,7 @@ def parse_args() -> argparse.Namespace:
     parser.add_argument("--num-envs", type=int, help="simulations; default: the config's")
     parser.add_argument("--num-steps", type=int, default=NUM_STEPS, help="control steps a round")
     parser.add_argument("--config", default="flat", help="a config file or a shipped config")
-    parser.add_argument("--seconds", type=float, default=10.0, help="for the timed rounds")
+    parser.add_argument("--seconds", type=float, default=8.0, help="for the timed rounds")
     return parser.parse_args()
 
 
@@ -156,11 +158,12 @@ def make_parts(
     samples = collect(world, state, key).transition
     if bool(jnp.any(samples.terminated | samples.truncated)):
         raise SystemExit("an episode ended during the rollout: raw and rollout would differ")
+    targets, samples = np.asarray(samples.extras), samples.replace(extras=None)
     update = jax.jit(lambda state, samples, key: updated(learner, state, samples, key))
     # not donated, since every round starts from the same state
     iteration = jax.jit(learner.iteration)
     parts: dict[str, Run] = {
-        "raw": raw_run(config, task, state, hinge_targets(learner, world, state, key)),
+        "raw": raw_run(config, task, state, targets),
         "rollout": lambda: jax.block_until_ready(collect(world, state, key)),
         "update": lambda: jax.block_until_ready(update(state, samples, key)),
         "iteration": lambda: jax.block_until_ready(iteration(world, state)),
@@ -170,11 +173,22 @@ def make_parts(
     return parts
 
 
+@dataclasses.dataclass(frozen=True)
+class Recorded:
+    """The task, which also gives what it sends to the engine [B, J] (rad)."""
+
+    task: GetUpTask
+
+    def step(
+        self, world: Any, state: EpisodeState, action: jax.Array
+    ) -> tuple[EpisodeState, StepOutput]:
+        after, output = self.task.step(world, state, action)
+        return after, output.replace(extras=self.task.servo_target(world, state, after.action))
+
+
 def collected(learner: Learner, world: Any, state: TrainState, key: jax.Array) -> Rollout:
-    policy = make_policy(learner, state)
-    return rollout(
-        learner.env, world, state.environment, policy, key, learner.config.num_steps
-    )
+    env, policy = Recorded(learner.env), make_policy(learner, state)
+    return rollout(env, world, state.environment, policy, key, learner.config.num_steps)
 
 
 def make_policy(learner: Learner, state: TrainState) -> Callable:
@@ -191,19 +205,6 @@ def make_policy(learner: Learner, state: TrainState) -> Callable:
 def updated(learner: Learner, state: TrainState, samples: Any, key: jax.Array) -> Any:
     current, batch, _ = estimate(learner.model, state.learner, samples, learner.config)
     return learner._improve(current, batch, learner.stage(state), key)
-
-
-def hinge_targets(learner: Learner, world: Any, state: TrainState, key: jax.Array) -> np.ndarray:
-    """What the rollout sends to the engine [T, B, J] (rad)."""
-    env, policy = learner.env, make_policy(learner, state)
-
-    def step(environment: Any, key_step: jax.Array) -> tuple[Any, jax.Array]:
-        action, _ = policy(environment.observation, key_step)
-        after, _ = env.step(world, environment, action)
-        return after, env.servo_target(world, environment, after.action)
-
-    keys = jax.random.split(key, learner.config.num_steps)
-    return np.asarray(jax.jit(lambda e: jax.lax.scan(step, e, keys)[1])(state.environment))
 
 
 def raw_run(config: Config, task: BuiltTask, state: TrainState, targets: np.ndarray) -> Run:
@@ -288,7 +289,8 @@ def processor() -> str:
 
 def show(result: dict[str, Any], seconds: dict[str, list[float]]) -> None:
     settings, machine = result["settings"], result["machine"]
-    title = "{engine}, {num_envs} simulations x {num_steps} steps, {rounds} rounds".format(**settings)
+    title = "{engine}, {num_envs} simulations x {num_steps} steps, {rounds} rounds"
+    title = title.format(**settings)
     table = Table("part", "control steps/s", "of raw", "fastest", "slowest", title=title)
     steps = settings["num_envs"] * settings["num_steps"]
     for name, times in seconds.items():

@@ -21,8 +21,8 @@ from getup_jax.paths import asset_path
 from getup_jax.physics.character import CharacterSpec, load_character
 
 FRAMES, WIDTH, HEIGHT = 8, 150, 200  # pixels of one frame
-AZIMUTH_DEG, ELEVATION_DEG, DISTANCE_M, LOOK_AT_M = 62.0, -14.0, 3.4, 0.72
-COLOURS = 96  # of the palette, which keeps the files small
+AZIMUTH_DEG, ELEVATION_DEG, DISTANCE_M, LOOK_AT_M = 118.0, -14.0, 3.4, 0.72
+COLOURS = 160  # of the palette, which keeps the files small
 
 
 def main(names: list[str]) -> None:

@@ -84,7 +84,12 @@ def test_wilson_without_trials_is_unknown():
 def test_stand_time_is_that_of_the_last_low_height():
     # low until 1.0 s; low, up, low again at 1.5 s; never low; always low
     heights = np.array(
-        [[0.2, 0.2, 0.95, 0.2], [0.8, 0.95, 0.95, 0.3], [0.95, 0.85, 1.0, 0.4], [1.0, 1.0, 1.0, 0.5]]
+        [
+            [0.2, 0.2, 0.95, 0.2],
+            [0.8, 0.95, 0.95, 0.3],
+            [0.95, 0.85, 1.0, 0.4],
+            [1.0, 1.0, 1.0, 0.5],
+        ]
     )
     np.testing.assert_allclose(stand_time(make_trace(heights)), [1.0, 1.5, 0.0, 2.0])
 

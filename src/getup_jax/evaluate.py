@@ -104,7 +104,8 @@ def run_episodes(
     getup = np.arange(episodes) % num_styles
     row = np.random.default_rng(seed).integers(rows, size=episodes)
     size = min(BATCH, episodes)
-    roll = jax.jit(_roll, static_argnums=(0, 1, 2, 3))
+    options = task.environment.engine.compiler_options
+    roll = jax.jit(_roll, static_argnums=(0, 1, 2, 3), compiler_options=options)
     length = episode_steps(task, kind)
     parts = []
     for first in range(0, episodes, size):

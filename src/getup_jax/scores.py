@@ -139,8 +139,10 @@ def table(scores: Scores) -> str:
 def _mean(values: dict[str, np.ndarray]) -> Scores:
     episodes = len(values["success"])
     low, high = wilson(float(values["success"].sum()), episodes)
-    means = {name: float(np.nanmean(x)) if np.isfinite(x).any() else math.nan
-             for name, x in values.items()}  # fmt: skip
+    means: dict[str, Any] = {
+        name: float(np.nanmean(x)) if np.isfinite(x).any() else math.nan
+        for name, x in values.items()
+    }
     return Scores(success_low=low, success_high=high, episodes=episodes, **means)
 
 

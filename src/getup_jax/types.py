@@ -44,8 +44,9 @@ class Engine(Protocol):
 
     name: str
     control_dt: float  # s, one control period
+    compiler_options: dict[str, Any] | None  # for jitting what steps the engine outside training
 
-    def place(self, qpos: jax.Array, qvel: jax.Array) -> PhysicsState:
+    def place(self, qpos: Any, qvel: Any) -> PhysicsState:
         """States with the given qpos[P, 7 + J] and qvel[P, 6 + J]; pools are made of these."""
         ...
 

@@ -63,7 +63,7 @@ def _renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Renderer:
 
 def _imageio() -> Any:
     try:
-        import imageio.v2 as imageio
+        import imageio.v2 as imageio  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise ConfigError(
             "--video: needs imageio; install the extra: pip install 'getup-jax[video]'"

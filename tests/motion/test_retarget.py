@@ -96,6 +96,14 @@ def test_standing_feet_are_put_on_the_floor(character):
     assert clip.qpos[-1, 2] == pytest.approx(standing.qpos[-1, 2], abs=0.01)
 
 
+def test_a_clip_that_never_stands_lies_on_the_floor(character):
+    lying = getup_clip(character, PRONE, still_s=0.5).qpos[:10]
+    sunk = lying - np.eye(lying.shape[1])[2]  # a metre lower
+    clip, report = retarget(record(Clip("crawl", 30.0, sunk), character), character)
+    assert abs(clip.qpos[0, 2] - 0.12) < 0.03
+    assert report.position_error_m < 0.02
+
+
 def test_the_rate_is_changed(character):
     clip = getup_clip(character, still_s=0.5, rise_s=0.5)
     fast = dataclasses.replace(record(clip, character), fps=60.0)

@@ -19,7 +19,7 @@ from poses import clipped, lying
 from getup_jax.config import ConfigError, PhysicsConfig
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.engine import make_engine
-from getup_jax.physics.mjx import MjxState
+from getup_jax.physics.mjx import CPU_COMPILER_OPTIONS, MjxState
 from getup_jax.types import Kinematics, PhysicsState
 
 CONFIG = PhysicsConfig(engine="mjx", solver="newton")
@@ -28,14 +28,6 @@ STEPS = 30
 
 # The rows of the one batch.
 AIRBORNE, STANDING, LYING, SATURATED = range(4)
-
-# By default XLA takes more than twice as long to compile the step for a CPU, and the result is
-# slower. These options change it by rounding alone.
-QUICK_COMPILE = {
-    "xla_backend_optimization_level": 0,
-    "xla_llvm_disable_expensive_passes": True,
-    "xla_cpu_use_fusion_emitters": False,
-}
 
 Step = Callable[[PhysicsState, jax.Array], PhysicsState]
 
@@ -61,7 +53,7 @@ def newton() -> CharacterSpec:
 @pytest.fixture(scope="module")
 def step(newton) -> Step:
     """The only compiled MJX program of these tests, for a batch of four."""
-    return jax.jit(make_engine(newton, CONFIG).step, compiler_options=QUICK_COMPILE)
+    return jax.jit(make_engine(newton, CONFIG).step, compiler_options=CPU_COMPILER_OPTIONS)
 
 
 @pytest.fixture(scope="module")

@@ -117,7 +117,8 @@ def test_kinematics_are_those_of_the_new_state(engine, character):
             body = mujoco.mjtObj.mjOBJ_XBODY
             mujoco.mj_objectVelocity(model, data, body, link + 1, velocity, 0)
             angular, linear = velocity[:3], velocity[3:]
-            np.testing.assert_allclose(kinematics.link_angular_velocity[i, link], angular, atol=1e-4)
+            got = kinematics.link_angular_velocity[i, link]
+            np.testing.assert_allclose(got, angular, atol=1e-4)
             np.testing.assert_allclose(kinematics.link_linear_velocity[i, link], linear, atol=1e-4)
     assert np.abs(kinematics.link_linear_velocity).max() > 0.1
 

@@ -106,9 +106,7 @@ def test_the_servo_target_goes_to_the_engine(jitted):
     after, _ = jitted.advance(jitted.world, state, action)
     target = jitted.servo_target(jitted.world, state, 0.2 * action + 0.8 * state.action)
     expected = jax.jit(jitted.task.engine.step)(state.physics, target)
-    np.testing.assert_allclose(
-        after.physics.kinematics.qpos, expected.kinematics.qpos, atol=1e-5
-    )
+    np.testing.assert_allclose(after.physics.kinematics.qpos, expected.kinematics.qpos, atol=1e-5)
 
 
 # Starts.
@@ -334,7 +332,5 @@ def test_resets_draw_the_kinds_in_their_shares_and_all_styles(jitted):
 def test_a_share_of_zero_draws_nothing(jitted):
     config = dataclasses.replace(jitted.task.config, stand_start=0.0, clip_start=0.0)
     task = dataclasses.replace(jitted.task, config=config)
-    state = jax.jit(task.start_random, static_argnums=2)(
-        jitted.world, jax.random.PRNGKey(0), 500
-    )
+    state = jax.jit(task.start_random, static_argnums=2)(jitted.world, jax.random.PRNGKey(0), 500)
     np.testing.assert_array_equal(state.kind, LYING)

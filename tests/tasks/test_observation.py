@@ -119,9 +119,7 @@ def test_values_of_standing(observer, engine, character):
     blocks = observe(observer, standing(engine, character, yaw=1.1, x=4.0))
     root = character.neutral_qpos[2]
     # 0.09 + 0.11 + 0.11 + 0.22 m from the pelvis to the neck
-    np.testing.assert_allclose(
-        blocks["features"], [[root + 0.53, np.pi / 2, np.pi / 2]], atol=1e-4
-    )
+    np.testing.assert_allclose(blocks["features"], [[root + 0.53, np.pi / 2, np.pi / 2]], atol=1e-4)
     np.testing.assert_allclose(blocks["height_map"], root, atol=1e-5)
     np.testing.assert_allclose(blocks["link_angular_velocity"], 0.0)
     np.testing.assert_allclose(blocks["link_linear_velocity"], 0.0)

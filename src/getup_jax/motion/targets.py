@@ -22,6 +22,7 @@ _BONES = {"head": "neck"} | {
         ("hand", "forearm"),
     )
 }
+_STANDING = 0.8  # of the neutral pelvis height: the character stands
 _FLAT_COSINE = 0.97  # between the up axis of a flat foot and up
 
 
@@ -59,7 +60,7 @@ def make_targets(
     for index, link in names.items():
         targets.position[:, index] = position[link]
         targets.rotation[:, index] = rotation[link]
-    level = _standing_level(targets, body) if floor is None else maker.scale * floor
+    level = _floor_level(targets, body) if floor is None else maker.scale * floor
     targets.position[..., 2] -= level
     heights = hull_heights(targets.position, targets.rotation, body)
     for index in names:
@@ -179,20 +180,22 @@ def hull_heights(position: np.ndarray, rotation: np.ndarray, body: Body) -> np.n
     return position[:, hull.link, 2] + turned - hull.radius
 
 
-def _standing_level(targets: Targets, body: Body) -> float:
+def _floor_level(targets: Targets, body: Body) -> float:
     """Height of the floor under a flat foot while the character stands.
 
     Measured at the ankle: a sole's edge dips below the floor when a flat foot tilts a little.
+    A clip that never stands is taken to lie or crawl on its lowest points.
     """
-    feet = [body.links["foot_l"], body.links["foot_r"]]
-    hull = body.hull
-    soles = [hull.link == foot for foot in feet]
-    depths = [(hull.radius - hull.point[:, 2])[sole].max() for sole in soles]
+    hull, feet = body.hull, [body.links["foot_l"], body.links["foot_r"]]
+    depths = [(hull.radius - hull.point[:, 2])[hull.link == foot].max() for foot in feet]
     below = targets.position[:, feet, 2] - np.array(depths)  # [F, 2]
-    lower = below.argmin(axis=1)[:, None]
-    level = below.min(axis=1)
-    size = targets.position[:, body.links["pelvis"], 2] - level
-    standing = size > 0.85 * np.percentile(size, 98)
+    lower, level = below.argmin(axis=1)[:, None], below.min(axis=1)
+    height = targets.position[:, body.links["pelvis"], 2] - level
+    standing = height > _STANDING * body.character.neutral_qpos[2]
+    if not standing.any():
+        known = np.isin(hull.link, list(targets.names))
+        lowest = hull_heights(targets.position, targets.rotation, body)[:, known].min(axis=1)
+        return float(np.median(lowest))
     up = np.take_along_axis(targets.rotation[:, feet, 2, 2], lower, axis=1)[:, 0]
     flat = standing & (up > _FLAT_COSINE)
     enough = flat.sum() > 0.1 * standing.sum()

@@ -33,6 +33,7 @@ class NativeEngine:
     """Steps batches of one character with MuJoCo's own batch stepper, in float64."""
 
     name = "native"
+    compiler_options: dict[str, Any] | None = None
 
     def __init__(self, character: CharacterSpec, config: PhysicsConfig):
         self.model = _without_autoreset(character.model)
@@ -42,7 +43,7 @@ class NativeEngine:
         self._batches: dict[int, _HostBatch] = {}
         self._lock = threading.Lock()
 
-    def place(self, qpos: jax.Array, qvel: jax.Array) -> PhysicsState:
+    def place(self, qpos: Any, qvel: Any) -> PhysicsState:
         """See `Engine.place`; runs on the host."""
         qpos, qvel = np.asarray(qpos, np.float64), np.asarray(qvel, np.float64)
         batch = self._batch(len(qpos))
