@@ -51,6 +51,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)
     parser.add_argument("--quick", action="store_true", help="two settings, one round")
+    parser.add_argument("--rounds", type=int, default=3, help="of the speed trial (default: 3)")
     args = parser.parse_args()
     names = list(SETTINGS)[:2] if args.quick else list(SETTINGS)
     configs = {name: dataclasses.replace(BASE, **SETTINGS[name]) for name in names}
@@ -60,7 +61,7 @@ def main() -> None:
         | track(characters[name], configs[name].substeps)
         for name in names
     }
-    for _ in range(1 if args.quick else 5):
+    for _ in range(1 if args.quick else args.rounds):
         for name in names:
             rate = speed(characters[name], configs[name].substeps)
             rows[name].setdefault("rates", []).append(rate)
