@@ -131,12 +131,14 @@ def test_eval_passes_its_arguments_on(monkeypatch):
     assert cli.eval_main([]) == 0
     options = ["--ckpt", "runs/a", "--episodes", "7", "--seed", "3", "--json", "a.json"]
     assert cli.eval_main([*options, "--video", "a.mp4", "--engine", "mjx"]) == 0
-    default = {"ckpt": "flat", "episodes": 100, "seed": 0}
-    default |= dict.fromkeys(["json", "video", "engine"])
+    default = {"ckpt": "flat", "episodes": 100, "seed": 0, "start": "lying"}
+    default |= dict.fromkeys(["json", "video", "engine", "stand_time"])
     assert vars(seen[0]) == default
     assert vars(seen[1]) == {
         "ckpt": "runs/a",
         "episodes": 7,
+        "start": "lying",
+        "stand_time": None,
         "seed": 3,
         "json": Path("a.json"),
         "video": Path("a.mp4"),

@@ -22,7 +22,7 @@ from getup_jax.physics.engine import make_engine
 from getup_jax.physics.mjx import CPU_COMPILER_OPTIONS, MjxState
 from getup_jax.types import Kinematics, PhysicsState
 
-CONFIG = PhysicsConfig(engine="mjx", solver="newton")
+CONFIG = PhysicsConfig(engine="mjx", solver="newton", gain_scale=1.5)
 NATIVE = dataclasses.replace(CONFIG, engine="native")
 STEPS = 30
 

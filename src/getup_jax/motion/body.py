@@ -83,6 +83,13 @@ def record(clip: Clip, character: CharacterSpec) -> Recording:
     )
 
 
+def hull_heights(position: np.ndarray, rotation: np.ndarray, body: Body) -> np.ndarray:
+    """Lowest height [F, P] of every hull point, of link poses [F, L, ...]."""
+    hull = body.hull
+    turned = np.einsum("fpj,pj->fp", rotation[:, hull.link, 2], hull.point)
+    return position[:, hull.link, 2] + turned - hull.radius
+
+
 def _hull(model: mujoco.MjModel) -> Hull:
     link, point, radius = [], [], []
     for geom in range(model.ngeom):

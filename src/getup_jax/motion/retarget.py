@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from getup_jax.motion.body import Body, body_of
+from getup_jax.motion.body import Body, body_of, hull_heights
 from getup_jax.motion.clips import Clip, MotionError
 from getup_jax.motion.names import map_names, require_links, unknown_joints
 from getup_jax.motion.skeleton import (
@@ -27,7 +27,7 @@ from getup_jax.motion.skeleton import (
     without_first,
 )
 from getup_jax.motion.solver import SolverSettings, solve_clip
-from getup_jax.motion.targets import Targets, hull_heights, make_targets
+from getup_jax.motion.targets import Targets, make_targets
 from getup_jax.physics.character import CharacterSpec
 
 # Units that motion files come in: m, cm, inch, mm, and CMU's (inches times 0.45).

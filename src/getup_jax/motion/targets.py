@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from getup_jax.motion.body import Body
+from getup_jax.motion.body import Body, hull_heights
 from getup_jax.motion.calibrate import anatomical_frames
 from getup_jax.motion.skeleton import Recording, forward, rest_positions
 
@@ -171,13 +171,6 @@ class _Maker:
         points = np.stack([hips, *(rest[at[link]] for link in known)])
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
         return along / along[-1], float(along[-1])
-
-
-def hull_heights(position: np.ndarray, rotation: np.ndarray, body: Body) -> np.ndarray:
-    """Lowest height [F, P] of every hull point, of link poses [F, L, ...]."""
-    hull = body.hull
-    turned = np.einsum("fpj,pj->fp", rotation[:, hull.link, 2], hull.point)
-    return position[:, hull.link, 2] + turned - hull.radius
 
 
 def _floor_level(targets: Targets, body: Body) -> float:
