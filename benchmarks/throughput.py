@@ -12,7 +12,8 @@ median of the rounds is reported.
   iteration  one whole training iteration, as `getup-train` runs it
 
 All start from the same lying characters, take the same number of control steps with the actions of
-the untrained policy, and no episode ends meanwhile, so raw and rollout do the same physical work.
+the untrained policy, and no episode ends meanwhile, so raw and rollout do the same physical work;
+with native it is checked that they end in the same states, bit for bit.
 The pose prior is untrained and the get-ups are made up: only their sizes matter here.
 """
 
@@ -137,11 +138,8 @@ def make_prior(config: Config, character: CharacterSpec) -> PosePrior:
     poses = character.neutral_qpos[7:] + POSE_STD_RAD * rng.normal(size=(256, joints))
     conditions = rng.normal(1.0, 0.5, (256, 3))
     model = CVAE(joints, latent, config.prior.hidden_sizes, config.prior.conditional)
-    variables = jax.jit(lambda key: init_variables(model, key, poses, conditions))(
-        jax.random.PRNGKey(0)
-    )
     return PosePrior(
-        variables=variables,
+        variables=init_variables(model, jax.random.PRNGKey(0), poses, conditions),
         latent_mean=jnp.zeros(latent),
         latent_std=jnp.ones(latent),
         joint_lower=jnp.asarray(character.joint_lower, jnp.float32),
@@ -154,16 +152,20 @@ def make_parts(
 ) -> dict[str, Run]:
     """The four parts as functions that return when they are done; all are warmed up here."""
     world, key = task.world, jax.random.PRNGKey(1)
-    collect = jax.jit(lambda world, state, key: collected(learner, world, state, key))
-    samples = collect(world, state, key).transition
+    options = task.environment.engine.compiler_options
+    collect = jax.jit(
+        lambda world, state, key: collected(learner, world, state, key), compiler_options=options
+    )
+    experience = collect(world, state, key)
+    samples, last = experience.transition, experience.environment.physics
     if bool(jnp.any(samples.terminated | samples.truncated)):
         raise SystemExit("an episode ended during the rollout: raw and rollout would differ")
     targets, samples = np.asarray(samples.extras), samples.replace(extras=None)
     update = jax.jit(lambda state, samples, key: updated(learner, state, samples, key))
     # not donated, since every round starts from the same state
-    iteration = jax.jit(learner.iteration)
+    iteration = jax.jit(learner.iteration, compiler_options=options)
     parts: dict[str, Run] = {
-        "raw": raw_run(config, task, state, targets),
+        "raw": raw_run(config, task.environment.engine, state, targets, last),
         "rollout": lambda: jax.block_until_ready(collect(world, state, key)),
         "update": lambda: jax.block_until_ready(update(state, samples, key)),
         "iteration": lambda: jax.block_until_ready(iteration(world, state)),
@@ -207,9 +209,11 @@ def updated(learner: Learner, state: TrainState, samples: Any, key: jax.Array) -
     return learner._improve(current, batch, learner.stage(state), key)
 
 
-def raw_run(config: Config, task: BuiltTask, state: TrainState, targets: np.ndarray) -> Run:
-    """The engine alone, from the rollout's start states."""
-    engine, first = task.environment.engine, state.environment.physics
+def raw_run(
+    config: Config, engine: Any, state: TrainState, targets: np.ndarray, last: PhysicsState
+) -> Run:
+    """The engine alone, from the rollout's start states to its last ones."""
+    first = state.environment.physics
     if engine.name != "native":
         return scan_run(engine, first, jnp.asarray(targets))
     rows = np.array(first.engine).view(np.float64)
@@ -223,15 +227,18 @@ def raw_run(config: Config, task: BuiltTask, state: TrainState, targets: np.ndar
             batch.ctrl = ctrl
             batch.step(nstep=config.physics.substeps, stage=stage)
 
+    run()
+    if not np.array_equal(batch.state, np.array(last.engine).view(np.float64)):
+        raise SystemExit("raw and rollout end in different states: their rates do not compare")
     return run
 
 
 def scan_run(engine: Any, first: PhysicsState, targets: jax.Array) -> Run:
-    @jax.jit
     def play(state: PhysicsState, targets: jax.Array) -> PhysicsState:
         return jax.lax.scan(lambda s, ctrl: (engine.step(s, ctrl), None), state, targets)[0]
 
-    return lambda: jax.block_until_ready(play(first, targets))
+    compiled = jax.jit(play, compiler_options=engine.compiler_options)
+    return lambda: jax.block_until_ready(compiled(first, targets))
 
 
 def measure(parts: dict[str, Run], budget_s: float) -> dict[str, list[float]]:

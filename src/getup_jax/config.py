@@ -29,7 +29,7 @@ class PhysicsConfig:
     substeps: int = 2  # physics steps in one control period
     solver: str = "auto"  # newton | cg | pgs; auto: pgs on native, newton on MJX, which has no pgs
     iterations: int = 10  # solver iterations at most
-    gain_scale: float = 2.0  # times the stiffness and damping of the MJCF file
+    gain_scale: float = 1.5  # times the stiffness and damping of the MJCF file
     torque_scale: float = 1.0  # times the torque limits of the MJCF file
     armature: float = 0.1  # kg m^2, added to every hinge
     threads: int = 0  # native: worker threads; 0: every CPU this process may use

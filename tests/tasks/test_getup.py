@@ -135,8 +135,8 @@ def test_a_lying_start_is_at_the_start_of_its_curve(jitted):
 
 
 def test_a_scaled_duration_stretches_the_episode(jitted):
-    task, kind, row = jitted.task, jnp.full(B, STANDING), jnp.arange(B)
-    slow = task.start(jitted.world, jnp.zeros(B, int), kind, row, duration_scale=2.0)
+    kind, row = jnp.full(B, STANDING), jnp.arange(B)
+    slow = jitted.start_rows(jitted.world, jnp.zeros(B, int), kind, row, 2.0)
     np.testing.assert_allclose(slow.duration, 2.0)
     np.testing.assert_allclose(slow.time, 2.0)
 

@@ -88,7 +88,7 @@ def test_heading_and_horizontal_place_do_not_matter(observer, engine, character,
     qpos, qvel = random_states(character, 4)
     turn = Rotation.from_rotvec([0.0, 0.0, yaw])
     moved, moving = qpos.copy(), qvel.copy()
-    moved[:, :3] = turn.apply(qpos[:, :3]) + [3.0, -5.0, 0.0]
+    moved[:, :3] = turn.apply(qpos[:, :3]) + np.array([3.0, -5.0, 0.0])
     start = Rotation.from_quat(qpos[:, 3:7], scalar_first=True)
     moved[:, 3:7] = (turn * start).as_quat(scalar_first=True)
     moving[:, :3] = turn.apply(qvel[:, :3])  # the angular part is in the root's own frame

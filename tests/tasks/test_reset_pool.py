@@ -1,0 +1,129 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from tiny_task import CONFIG, getups
+
+from getup_jax.config import ConfigError
+from getup_jax.tasks.episode import CLIP, LYING, STANDING
+from getup_jax.tasks.reset_pool import angle_gap, build_pool, kind_shares
+
+TASK = dataclasses.replace(CONFIG.task, stand_start=0.2, clip_start=0.3, pool_size=60)
+
+
+def pool_of(character, engine, **changes):
+    config = dataclasses.replace(TASK, **changes)
+    return build_pool(getups(character), character, engine, config, seed=0)
+
+
+def rows(pool, kind: int, style: int) -> dict[str, np.ndarray]:
+    index = np.asarray(pool.table[kind, style])
+    state = pool.physics.kinematics
+    return {
+        "qpos": np.asarray(state.qpos)[index],
+        "qvel": np.asarray(state.qvel)[index],
+        "time": np.asarray(pool.time)[index],
+    }
+
+
+@pytest.fixture(scope="module")
+def pool(character, engine):
+    return pool_of(character, engine)
+
+
+def test_every_kind_and_style_has_its_share_of_the_pool(pool):
+    # 60 rows of three kinds and two styles
+    assert pool.table.shape == (3, 2, 10)
+    np.testing.assert_array_equal(np.sort(np.ravel(pool.table)), np.arange(60))
+    assert pool.time.shape == (60,)
+    assert np.asarray(pool.physics.kinematics.finite).all()
+
+
+def test_a_kind_without_a_share_has_one_row_a_style(character, engine):
+    pool = pool_of(character, engine, stand_start=0.0, clip_start=0.0)
+    assert pool.table.shape == (3, 2, 30)
+    assert len(np.unique(pool.table[LYING])) == 60
+    assert len(np.unique(pool.table[STANDING])) == 2
+    assert len(np.unique(pool.table[CLIP])) == 2
+
+
+def test_the_shares_of_the_kinds_are_in_their_order():
+    shares = kind_shares(TASK)
+    assert shares[LYING] == pytest.approx(0.5)
+    assert (shares[STANDING], shares[CLIP]) == (0.2, 0.3)
+
+
+@pytest.mark.parametrize("style", [0, 1])
+def test_lying_starts_rest_on_the_floor_at_the_start_of_the_curve(pool, style):
+    start = rows(pool, LYING, style)
+    np.testing.assert_array_equal(start["time"], 0.0)
+    assert (start["qpos"][:, 2] < 0.15).all()
+    assert np.abs(start["qvel"][:, :3]).max() < 0.5
+
+
+def test_standing_starts_stand_still_at_the_end_of_the_curve(pool, character):
+    start = rows(pool, STANDING, 1)
+    np.testing.assert_array_equal(start["time"], 2.0)
+    np.testing.assert_array_equal(start["qvel"], 0.0)
+    neutral = np.tile(character.neutral_qpos[7:], (10, 1))
+    np.testing.assert_allclose(start["qpos"][:, 7:], neutral, atol=1e-6)
+
+
+def test_starts_have_any_heading(pool):
+    quaternion = rows(pool, STANDING, 0)["qpos"][:, 3:7]
+    yaw = Rotation.from_quat(quaternion, scalar_first=True).as_rotvec()[:, 2]
+    assert np.ptp(yaw) > 2.0
+
+
+def test_starts_along_the_clip_move_like_it(pool, character):
+    clip = getups(character)[0].clip
+    start = rows(pool, CLIP, 0)
+    frame = np.round(start["time"] * clip.fps).astype(int)
+    assert set(frame) == {0, 1}  # the last frame has no velocity
+    np.testing.assert_allclose(start["time"], frame / clip.fps, atol=1e-6)
+    np.testing.assert_allclose(start["qpos"][:, 3:], clip.qpos[frame, 3:], atol=1e-6)
+    climb = clip.fps * (clip.qpos[frame + 1, 2] - clip.qpos[frame, 2])
+    np.testing.assert_allclose(start["qvel"][:, 2], climb, atol=1e-5)
+
+
+def test_a_curve_without_a_clip_starts_lying_instead(pool):
+    start = rows(pool, CLIP, 1)
+    np.testing.assert_array_equal(start["time"], 0.0)
+    assert (start["qpos"][:, 2] < 0.15).all()
+
+
+def test_noise_stays_inside_the_joint_limits(character, engine):
+    noisy = pool_of(character, engine, start_noise_rad=0.3)
+    joints = rows(noisy, STANDING, 0)["qpos"][:, 7:]
+    assert joints.std(axis=0).mean() > 0.1
+    assert (joints >= character.joint_lower - 1e-6).all()
+    assert (joints <= character.joint_upper + 1e-6).all()
+
+
+def test_the_same_seed_gives_the_same_pool(pool, character, engine):
+    again = pool_of(character, engine)
+    np.testing.assert_array_equal(again.physics.engine, pool.physics.engine)
+
+
+def test_a_curve_that_starts_unlike_every_pose_is_an_error(character, engine):
+    clip, curve = getups(character)
+    points = curve.points.copy()
+    points[0, 2] = 1.0  # the front angle of a supine pose is 0
+    curve = dataclasses.replace(curve, points=points)
+    assert angle_gap(clip.clip.qpos[0], curve, character) == pytest.approx(1.0, abs=0.05)
+    with pytest.raises(
+        ConfigError, match=r"'curve': .* 1\.0\d rad .*task\.curve_match_rad = 0\.52"
+    ):
+        build_pool([clip, curve], character, engine, TASK, seed=0)
+
+
+def test_a_wider_match_accepts_it(character, engine):
+    clip, curve = getups(character)
+    points = curve.points.copy()
+    points[0, 2] = 1.0
+    curve = dataclasses.replace(curve, points=points)
+    config = dataclasses.replace(TASK, curve_match_rad=1.2)
+    assert build_pool([clip, curve], character, engine, config, seed=0).table.shape == (3, 2, 10)
