@@ -82,7 +82,7 @@ def test_a_foot_that_rolls_over_its_edge_does_not_slip(character, feet):
     data = mujoco.MjData(character.model)
     data.qpos[:] = character.neutral_qpos
     mujoco.mj_kinematics(character.model, data)
-    toes = data.body("foot_l").xpos + [corners[:, 0].max(), 0.0, corners[:, 2].min()]
+    toes = data.body("foot_l").xpos + np.array([corners[:, 0].max(), 0.0, corners[:, 2].min()])
     pivot, angle = toes * [1, 0, 1], 0.3  # heels up
 
     def tip(qpos):

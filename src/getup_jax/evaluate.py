@@ -27,8 +27,6 @@ from getup_jax.scores import Scores, score, to_json
 from getup_jax.storage import from_nested
 from getup_jax.tasks.build import BuiltTask, build_task
 
-Log = Callable[[str], None]
-
 
 def evaluate_command(args: argparse.Namespace) -> int:
     """The command line of `getup-eval`; returns the exit code."""

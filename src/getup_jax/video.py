@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 import warnings
 from pathlib import Path
@@ -18,6 +19,8 @@ from getup_jax.scores import episode_values
 STYLES = 8  # filmed at most
 SIZE = (480, 640)  # rows, columns
 _VIEW_DEG = 120.0  # from the body's axis to the direction that the camera looks in
+_failures: list[str] = []  # why this process cannot render
+_SHADOW = 1024  # pixels; without a GPU, shadows are most of the rendering time
 _END_S = 0.5  # the last picture of an episode stays this long
 
 
@@ -87,6 +90,8 @@ def render(
 
     Raises ConfigError where this machine cannot render.
     """
+    model = copy.copy(model)
+    model.vis.quality.shadowsize = _SHADOW
     data, camera = mujoco.MjData(model), mujoco.MjvCamera()
     camera.distance, camera.elevation, camera.azimuth = 3.4, -14.0, view(qpos[0])
     images = []
@@ -113,13 +118,16 @@ def view(qpos: np.ndarray) -> float:
 
 
 def _renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Renderer:
-    try:
-        return mujoco.Renderer(model, *size)
-    except Exception as error:
-        raise ConfigError(
-            f"cannot render pictures ({error}); on a machine without a display install Mesa's EGL "
-            "(Debian: libegl1 libgl1-mesa-dri) and set MUJOCO_GL=egl before Python starts"
-        ) from error
+    """MuJoCo's renderer; after a failure it is not tried again, since GLFW then aborts Python."""
+    if not _failures:
+        try:
+            return mujoco.Renderer(model, *size)
+        except Exception as error:
+            _failures.append(str(error))
+    raise ConfigError(
+        f"cannot render pictures ({_failures[0]}); on a machine without a display install Mesa's "
+        "EGL (Debian: libegl1 libgl1-mesa-dri) and set MUJOCO_GL=egl before Python starts"
+    )
 
 
 def require() -> Any:
