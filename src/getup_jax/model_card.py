@@ -124,6 +124,7 @@ def _limits(loaded: LoadedPolicy, evaluations: Sequence[Mapping[str, Any]]) -> l
     weak = {
         f"{name} ({part['success']:.0%})"
         for result in evaluations
+        if result["conditions"]["start"] == "lying" and result["conditions"]["blend"] is None
         for name, part in (result.get("per_curve") or {}).items()
         if part["success"] < LOW_SUCCESS
     }
