@@ -20,8 +20,11 @@ def replace_rows(
     """
     total = mask.shape[0]
     size = min(chunk, total)
-    order = jnp.argsort(~mask, stable=True)  # the masked rows first
-    order = jnp.concatenate([order, jnp.zeros(size, order.dtype)])
+    place_in_order = jnp.cumsum(mask) - 1
+    order = jnp.zeros(total + size, jnp.int32)  # the masked rows, then zeros
+    order = order.at[jnp.where(mask, place_in_order, total + size)].set(
+        jnp.arange(total, dtype=jnp.int32), mode="drop"
+    )
     count = jnp.sum(mask)
 
     def replace_chunk(carry: tuple[jax.Array, Any]) -> tuple[jax.Array, Any]:
