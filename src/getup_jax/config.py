@@ -96,7 +96,7 @@ class TaskConfig:
     terminate_after_s: float = 0.3  # ... or with the head on the floor, for this long
     head_clearance_m: float = 0.02  # the head is on the floor below this gap
     stand_start: float = 0.3  # share of episodes that start standing
-    clip_start: float = 0.0  # share that starts along the reference clip
+    clip_start: float = 0.0  # share that starts along the reference clip, or one that fits
     curve_match_rad: float = 0.52  # largest gap between a curve's and a pose's torso angles
     start_noise_rad: float = 0.0  # joint noise of the start poses
     pool_size: int = 2048  # start states made once

@@ -2,12 +2,16 @@ from __future__ import annotations
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from tiny_task import CONFIG, getups
 
 from getup_jax.config import ConfigError
+from getup_jax.motion import curves
+from getup_jax.nets.prior_data import pose_conditions
+from getup_jax.tasks.clip_starts import ANGLE_MATCH_RAD, HEIGHT_MATCH_M, velocities
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 from getup_jax.tasks.reset_pool import angle_gap, build_pool, kind_shares
 
@@ -89,7 +93,28 @@ def test_starts_along_the_clip_move_like_it(pool, character):
     np.testing.assert_allclose(start["qvel"][:, 2], climb, atol=1e-5)
 
 
-def test_a_curve_without_a_clip_starts_lying_instead(pool):
+def test_a_curve_alone_starts_at_frames_that_look_like_it(pool, character):
+    clip, curve = getups(character)
+    start = rows(pool, CLIP, 1)
+    # the clip's frames are two: lying at time 0, and tipped up, which the slower curve is later
+    lying, tipped = clip.clip.qpos[:2]
+    early = start["time"] < 0.5
+    assert early.any() and not early.all()
+    frame = np.where(early[:, None], lying, tipped)
+    np.testing.assert_allclose(start["qpos"][:, 3:], frame[:, 3:], atol=1e-6)
+    target = np.asarray(curves.evaluate(jnp.asarray(curve.points), start["time"] / 2.0))
+    gap = np.abs(pose_conditions(frame, character) - target)
+    assert (gap < [HEIGHT_MATCH_M + 1e-3, ANGLE_MATCH_RAD + 1e-3, ANGLE_MATCH_RAD + 1e-3]).all()
+    # twice the clip's duration: half its pace
+    pace = velocities(clip.clip, character)[np.where(early, 0, 1)] / 2.0
+    np.testing.assert_allclose(start["qvel"], pace, atol=1e-5)
+
+
+def test_a_curve_unlike_every_frame_starts_lying_instead(character, engine):
+    clip, curve = getups(character)
+    points = curve.points + np.array([0.5, 0.0, 0.0])
+    curve = dataclasses.replace(curve, points=points)
+    pool = build_pool([clip, curve], character, engine, TASK, seed=0)
     start = rows(pool, CLIP, 1)
     np.testing.assert_array_equal(start["time"], 0.0)
     assert (start["qpos"][:, 2] < 0.15).all()

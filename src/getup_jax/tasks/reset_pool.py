@@ -12,10 +12,11 @@ import numpy as np
 from flax import struct
 
 from getup_jax.config import ConfigError, TaskConfig
-from getup_jax.motion.clips import Clip, GetUp
+from getup_jax.motion.clips import GetUp
 from getup_jax.motion.features import FeatureLinks, features
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.settle import lift_to_ground, settle
+from getup_jax.tasks.clip_starts import ClipFrames, velocities
 from getup_jax.tasks.episode import CLIP, STANDING
 from getup_jax.types import Engine, PhysicsState
 
@@ -45,7 +46,8 @@ def build_pool(
     rows = max(1, config.pool_size // max(1, len(getups) * sum(s > 0 for s in shares)))
     counts = [rows if share > 0 else 1 for share in shares]
     poses = [g.clip.qpos[0] for g in getups if g.clip is not None]
-    make = _StartMaker(character, config, np.random.default_rng(seed), poses)
+    frames = ClipFrames.of(getups, character) if config.clip_start > 0 else None
+    make = _StartMaker(character, config, np.random.default_rng(seed), poses, frames)
     starts, table, offset = [], np.zeros((3, len(getups), rows), np.int32), 0
     for kind, count in enumerate(counts):
         for index, getup in enumerate(getups):
@@ -76,28 +78,28 @@ class _StartMaker:
     config: TaskConfig
     rng: np.random.Generator
     lying_poses: list[np.ndarray]  # first poses of all reference motions
+    frames: ClipFrames | None  # of all reference motions, where starts along them are asked for
 
     def start(self, kind: int, getup: GetUp, count: int) -> _Start:
         if kind == STANDING:
             qpos = self._noisy(np.tile(self.character.neutral_qpos, (count, 1)))
             return qpos, self._at_rest(qpos), np.full(count, getup.duration)
-        if kind == CLIP and getup.clip is not None:
-            return self._along(getup.clip, count)
-        # a curve alone has no poses on its way: it starts lying in any case
+        along = self._along(getup, count) if kind == CLIP else None
+        if along is not None:
+            return along
         fitting = self._fitting(getup)
         qpos = self._noisy(
             np.stack([fitting[i] for i in self.rng.integers(len(fitting), size=count)])
         )
         return qpos, self._at_rest(qpos), np.zeros(count)
 
-    def _along(self, clip: Clip, count: int) -> _Start:
-        """Poses and velocities of random frames."""
-        model = self.character.model
-        frame = self.rng.integers(0, len(clip.qpos) - 1, size=count)
-        qvel = np.zeros((count, model.nv))
-        for row, f in zip(qvel, frame, strict=True):
-            mujoco.mj_differentiatePos(model, row, 1.0 / clip.fps, clip.qpos[f], clip.qpos[f + 1])
-        return clip.qpos[frame], qvel, frame / clip.fps
+    def _along(self, getup: GetUp, count: int) -> _Start | None:
+        """Random frames of the get-up's motion, or for a curve alone frames that look like it."""
+        if getup.clip is None:
+            return self.frames and self.frames.along(getup, count, self.rng)
+        frame = self.rng.integers(0, len(getup.clip.qpos) - 1, size=count)
+        qvel = velocities(getup.clip, self.character)[frame]
+        return getup.clip.qpos[frame], qvel, frame / getup.clip.fps
 
     def _fitting(self, getup: GetUp) -> list[np.ndarray]:
         """Lying poses whose torso angles are near the curve's first ones [P 5.2]."""
