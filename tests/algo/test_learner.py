@@ -260,7 +260,8 @@ def test_next_values_are_the_critics_on_the_final_observations(run: Run):
     state = run.initial(world, jax.random.key(5))
     learner, stage = run.learner, run.learner.stage(state)
     transition = learner._collect(world, state, stage, jax.random.key(6)).transition
-    assert bool(transition.truncated.any()) and not bool(transition.truncated.all())
+    assert bool(transition.truncated.any())
+    assert not bool(transition.truncated.all())
     value = learner.value(state.learner, transition.observation)
     reached = next_values(learner.model, state.learner, transition, value)
     expected = learner.value(state.learner, transition.final_observation)

@@ -99,7 +99,8 @@ def test_a_curve_alone_starts_at_frames_that_look_like_it(pool, character):
     # the clip's frames are two: lying at time 0, and tipped up, which the slower curve is later
     lying, tipped = clip.clip.qpos[:2]
     early = start["time"] < 0.5
-    assert early.any() and not early.all()
+    assert early.any()
+    assert not early.all()
     frame = np.where(early[:, None], lying, tipped)
     np.testing.assert_allclose(start["qpos"][:, 3:], frame[:, 3:], atol=1e-6)
     target = np.asarray(curves.evaluate(jnp.asarray(curve.points), start["time"] / 2.0))
