@@ -39,6 +39,10 @@ def test_import_list_events_and_plot(rise, tmp_path, capsys):
     assert "supine" in capsys.readouterr().out
     assert main(["plot", str(clips), "--out", str(tmp_path / "curves.png")]) == 0
     assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
+    classes = tmp_path / "strategies.png"
+    assert main(["plot", str(clips), "--strategies", "--out", str(classes)]) == 0
+    assert classes.read_bytes().startswith(b"\x89PNG")
+    assert classes.read_bytes() != (tmp_path / "curves.png").read_bytes()
 
 
 def test_a_bad_file_is_reported_and_the_others_go_on(rise, tmp_path, capsys):

@@ -36,6 +36,7 @@ examples:
   getup-motion events clips/fall.npz       when it lies, rises and stands
   getup-motion list authored clips/        get-ups that a config can train on
   getup-motion plot clips/ --out curves.png
+  getup-motion plot authored --strategies --out strategies.png
 """
 
 _EXIT = "exit code: 0 where every file was used, with warnings or without; 1 where one was not"
@@ -67,6 +68,9 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("sources", nargs="+", metavar="SOURCE", help=_SOURCE)
     plot.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture")
     plot.add_argument("--curves", nargs="*", default=[], metavar="NAME", help="only these get-ups")
+    plot.add_argument(
+        "--strategies", action="store_true", help="only mean and deviation of each strategy"
+    )
     events = _command(commands, "events", _events, "the get-ups in one file")
     events.add_argument("paths", nargs=1, type=Path, metavar="FILE")
     _add_reading(events)
@@ -138,11 +142,14 @@ def _list(args: argparse.Namespace, character: CharacterSpec) -> int:
 
 
 def _plot(args: argparse.Namespace, character: CharacterSpec) -> int:
-    from getup_jax.motion.plot import plot_getups
+    from getup_jax.motion.plot import plot_getups, plot_strategies
 
     config = MotionConfig(source=tuple(args.sources), curves=tuple(args.curves))
     library = load_motions(config, character)
-    plot_getups(library.getups, character, args.out)
+    if args.strategies:
+        plot_strategies(library.getups, args.out)
+    else:
+        plot_getups(library.getups, character, args.out)
     Console().print(f"{args.out}: {len(library.getups)} get-ups")
     return 0
 

@@ -88,8 +88,9 @@ def train_prior(
 ) -> tuple[PosePrior, PriorReport]:
     """A prior trained on all of `poses` but the held-out groups, and how good it is.
 
-    The defaults are Adam with a constant learning rate [P 3.5]. It runs for `epochs` or until `min_updates` updates,
-    whichever takes longer. A device computes the same prior from the same arguments.
+    The defaults are Adam with a constant learning rate [P 3.5]. It runs for `epochs` or until
+    `min_updates` updates, whichever takes longer. A device computes the same prior from the same
+    arguments.
     """
     start = time.perf_counter()
     rows = split(poses.group, config.holdout, config.seed)
