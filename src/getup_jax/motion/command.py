@@ -147,7 +147,7 @@ def _plot(args: argparse.Namespace, character: CharacterSpec) -> int:
     config = MotionConfig(source=tuple(args.sources), curves=tuple(args.curves))
     library = load_motions(config, character)
     if args.strategies:
-        plot_strategies(library.getups, args.out)
+        plot_strategies(library.getups, character, args.out)
     else:
         plot_getups(library.getups, character, args.out)
     Console().print(f"{args.out}: {len(library.getups)} get-ups")

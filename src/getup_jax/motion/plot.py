@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from getup_jax.motion import curves
 from getup_jax.motion.clips import GetUp, MotionError
 from getup_jax.motion.events import link_positions
 from getup_jax.motion.getups import clip_features
+from getup_jax.motion.strategies import classify
 from getup_jax.physics.character import CharacterSpec
 
 _LABELS = ("neck height (m)", "side to up (deg)", "front to up (deg)")
@@ -42,16 +44,16 @@ def plot_getups(getups: Sequence[GetUp], character: CharacterSpec, file: Path) -
     pyplot.close(figure)
 
 
-def plot_strategies(getups: Sequence[GetUp], file: Path) -> None:
+def plot_strategies(getups: Sequence[GetUp], character: CharacterSpec, file: Path) -> None:
     """Write one PNG as [P figure 8]: a row a strategy, mean and deviation over the phase.
 
-    Get-ups without a clip are left out: a drawn style at three durations would count three times.
+    The classes are those of `classify`. Get-ups without a motion are left out, and those that
+    turn to the left are drawn as their mirror images, so that both sides have one mean.
     """
-    recorded = [getup for getup in getups if getup.clip is not None]
-    if not recorded:
+    classes = strategy_curves(getups, character)
+    if not classes:
         raise MotionError("plot --strategies: no get-ups with a motion; leave the flag out")
     pyplot = _pyplot()
-    classes = class_curves(recorded)
     size = (11, 2.1 * len(classes) + 0.4)
     figure, axes = pyplot.subplots(len(classes), 3, figsize=size, squeeze=False, sharex=True)
     for row, (name, values) in zip(axes, classes.items(), strict=True):
@@ -66,6 +68,21 @@ def plot_strategies(getups: Sequence[GetUp], file: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, dpi=80)
     pyplot.close(figure)
+
+
+def strategy_curves(getups: Sequence[GetUp], character: CharacterSpec) -> dict[str, np.ndarray]:
+    """{strategy: curves [n, 101, 3]} of the get-ups with a motion, all turning to the right."""
+    named = []
+    for getup in getups:
+        if getup.clip is not None:
+            positions = link_positions(getup.clip, character)
+            name = classify(positions, getup.clip.fps, character)
+            named.append(dataclasses.replace(getup, strategy=name))
+    classes = class_curves(named) if named else {}
+    for values in classes.values():
+        left = values[..., 1].mean(axis=1) < 90.0
+        values[left, :, 1] = 180.0 - values[left, :, 1]
+    return classes
 
 
 def class_curves(getups: Sequence[GetUp]) -> dict[str, np.ndarray]:
