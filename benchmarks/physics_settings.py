@@ -29,20 +29,25 @@ from getup_jax.config import PhysicsConfig
 from getup_jax.motion.keyframes import load_authored
 from getup_jax.physics.character import CharacterSpec, load_character
 
-BASE = PhysicsConfig(substeps=2, solver="pgs", iterations=10, gain_scale=2.0, armature=0.1)
+BASE = PhysicsConfig(
+    substeps=2, solver="pgs", iterations=10, gain_scale=1.5, armature=0.1, damping=1.0
+)
 SETTINGS = {
-    "60 Hz, 2x, .1, PGS": {},
-    "60 Hz, 2x, .1, Newton": {"solver": "newton", "iterations": 5},
-    "60 Hz, 2x, .05, PGS": {"armature": 0.05},
-    "60 Hz, 1.5x, .1, PGS": {"gain_scale": 1.5},
+    "60 Hz, 1.5x, .1, PGS": {},
+    "60 Hz, 1.5x, .1, Newton": {"solver": "newton", "iterations": 5},
+    "60 Hz, 1.5x, .1, PGS, damping 0": {"damping": 0.0},
+    "60 Hz, 1.5x, .1, PGS, damping 3": {"damping": 3.0},
+    "60 Hz, 1.5x, .05, PGS": {"armature": 0.05},
     "60 Hz, 1x, .1, PGS": {"gain_scale": 1.0},
+    "60 Hz, 2x, .1, PGS": {"gain_scale": 2.0},
+    "60 Hz, 2x, .1, PGS, damping 0": {"gain_scale": 2.0, "damping": 0.0},
     "60 Hz, 5x, .1, PGS": {"gain_scale": 5.0},
-    "90 Hz, 2x, .1, PGS": {"substeps": 3},
+    "90 Hz, 2x, .1, PGS": {"substeps": 3, "gain_scale": 2.0},
     "90 Hz, 1x, .05, PGS": {"substeps": 3, "gain_scale": 1.0, "armature": 0.05},
     "120 Hz, 1x, .05, Newton": {
-        "substeps": 4, "gain_scale": 1.0, "armature": 0.05, "solver": "newton", "iterations": 5
+        "substeps": 4, "gain_scale": 1.0, "armature": 0.05, "solver": "newton", "iterations": 5,
     },
-    "120 Hz, 2x, .1, PGS": {"substeps": 4},
+    "120 Hz, 2x, .1, PGS": {"substeps": 4, "gain_scale": 2.0},
 }  # fmt: skip
 SIMS, PERIODS = 256, 20
 

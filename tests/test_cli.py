@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import types
@@ -109,8 +110,12 @@ def test_warnings_are_one_clean_line(calls, capsys, monkeypatch):
 
 EARLY = """
 import sys
-from getup_jax.cli import train_main
+from getup_jax.cli import eval_main, train_main
 code = train_main(["quick", "ppo.learnig_rate=1"])
+try:
+    eval_main(["--start-noise", "-1"])
+except SystemExit as error:
+    code = max(code, error.code)
 heavy = {"jax", "flax", "orbax", "mujoco", "numpy"} & set(sys.modules)
 sys.exit(code if not heavy else f"imported {heavy}")
 """
@@ -132,18 +137,38 @@ def test_eval_passes_its_arguments_on(monkeypatch):
     options = ["--ckpt", "runs/a", "--episodes", "7", "--seed", "3", "--json", "a.json"]
     assert cli.eval_main([*options, "--video", "a.mp4", "--engine", "mjx"]) == 0
     default = {"ckpt": "flat", "episodes": 100, "seed": 0, "start": "lying"}
-    default |= dict.fromkeys(["json", "video", "engine", "stand_time"])
+    default |= {"start_noise": 0.0, "duration_scale": (1.0, 1.0)}
+    default |= dict.fromkeys(["json", "video", "plot", "engine", "stand_time", "blend", "push"])
     assert vars(seen[0]) == default
-    assert vars(seen[1]) == {
+    assert vars(seen[1]) == default | {
         "ckpt": "runs/a",
         "episodes": 7,
-        "start": "lying",
-        "stand_time": None,
         "seed": 3,
         "json": Path("a.json"),
         "video": Path("a.mp4"),
         "engine": "mjx",
     }
+
+
+def test_pictures_need_no_display(monkeypatch):
+    # MuJoCo reads the variable when it is imported, so the command has to set it before
+    monkeypatch.setattr(os, "environ", {})
+    module = types.SimpleNamespace(evaluate_command=lambda _: None)
+    monkeypatch.setitem(sys.modules, "getup_jax.evaluate", module)
+    monkeypatch.setattr(sys, "platform", "linux")
+    cli.eval_main([])
+    assert os.environ == {}
+    cli.eval_main(["--plot", "a.png"])
+    assert os.environ == {"MUJOCO_GL": "egl"}
+
+
+def test_a_display_or_a_chosen_renderer_is_kept(monkeypatch):
+    module = types.SimpleNamespace(evaluate_command=lambda _: None)
+    monkeypatch.setitem(sys.modules, "getup_jax.evaluate", module)
+    for given in ({"DISPLAY": ":0"}, {"MUJOCO_GL": "osmesa"}):
+        monkeypatch.setattr(os, "environ", dict(given))
+        cli.eval_main(["--video", "a.mp4"])
+        assert os.environ == given
 
 
 def test_eval_errors_are_clean(monkeypatch, capsys):

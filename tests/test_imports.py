@@ -14,13 +14,16 @@ PACKAGE = Path(getup_jax.__file__).parent
 
 # From left to right; a name is a module or a sub-package of getup_jax.
 LAYERS = [
-    ["types", "config", "rotation"],
+    ["types", "config", "rotation", "rows"],
     ["convert", "paths", "settings"],
     ["storage", "manifest", "checkpoint", "metrics", "progress", "journal", "runfolder", "stop"],
     ["physics", "nets", "motion"],
     ["tasks"],
     ["algo"],
-    ["loop", "train", "evaluate", "scores", "video"],
+    ["loop", "train"],
+    ["conditions", "naturalness", "episodes", "scores", "score_table", "video", "eval_plot"],
+    ["evaluate", "model_card", "export"],
+    ["eval_options"],
     ["cli", "editor"],
 ]
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
@@ -82,7 +85,9 @@ def test_imports_flow_one_way(path):
     assert not wrong, f"{path.relative_to(PACKAGE)} imports {sorted(wrong)} of a layer to its right"
 
 
-@pytest.mark.parametrize("name", ["convert", "settings", "paths", "config", "runfolder", "cli"])
+@pytest.mark.parametrize(
+    "name", ["convert", "settings", "paths", "config", "runfolder", "cli", "eval_options"]
+)
 def test_what_answers_at_once_imports_nothing_heavy(name):
     names = imported((PACKAGE / f"{name}.py").read_text(encoding="utf-8"), "getup_jax")
     outside = {name.split(".")[0] for name in names} - set(sys.stdlib_module_names)

@@ -8,14 +8,19 @@ import numpy as np
 import pytest
 
 from getup_jax.motion.clips import GetUp
-from getup_jax.scores import episode_values, score, stand_time, table, to_json, wilson
+from getup_jax.score_table import table
+from getup_jax.scores import episode_values, score, stand_time, to_json, wilson
+from getup_jax.tasks.episode import STANDING
 
 DT = 0.5
 STAND_S = 1.0
 KEYS = {
     "success", "success_low", "success_high", "return_rate", "height_error_m", "angle_error_rad",
-    "stand_time_s", "jitter", "torque_nm", "energy_j", "episodes", "per_curve",
+    "stand_time_s", "jitter", "torque_nm", "energy_j", "saturation", "offset_rad", "foot_slip_m_s",
+    "penetration_m", "penetration_max_m", "success_pushed", "episodes", "per_orientation",
+    "per_curve",
 }  # fmt: skip
+STEP_VALUES = ("torque", "power", "jerk", "saturation", "offset", "slip", "penetration")
 
 
 def make_trace(heights, running=None, success=True, **changes) -> SimpleNamespace:
@@ -31,9 +36,8 @@ def make_trace(heights, running=None, success=True, **changes) -> SimpleNamespac
         "features": np.stack([heights, flat, flat], axis=-1),
         "target": np.stack([np.ones_like(heights), flat, flat], axis=-1),
         "time": np.tile(DT * np.arange(1, steps + 1)[:, None], (1, count)),
-        "qpos": np.zeros((steps, count, 9)),
-        "qvel": np.zeros((steps, count, 8)),
-        "torque": np.zeros((steps, count, 2)),
+        **{name: np.zeros((steps, count)) for name in STEP_VALUES},
+        "pushed": np.zeros((steps, count), bool),
         "task_reward": np.ones((steps, count)),
         "running": running,
         "success": last,
@@ -134,25 +138,48 @@ def test_full_episodes_have_the_steps_that_the_task_gives_them():
     np.testing.assert_allclose(values(trace)["return_rate"], [1.0])
 
 
-def test_torque_and_energy():
-    torque, qvel = np.zeros((2, 2, 2)), np.zeros((2, 2, 8))
-    torque[:, 0] = [3.0, -1.0]
-    qvel[:, 0, 6:] = [2.0, 4.0]
-    qvel[:, :, :6] = 100.0  # the root does no work
-    torque[:, 1], qvel[:, 1, 6:] = torque[:, 0], qvel[:, 0, 6:]
+def test_energy_is_the_power_over_the_time_of_the_episode():
     running = np.array([[1, 1], [1, 0]])
-    got = values(make_trace(np.ones((2, 2)), running, torque=torque, qvel=qvel))
-    np.testing.assert_allclose(got["torque_nm"], [2.0, 2.0])
-    # (3 * 2 + 1 * 4) W for one second and for half a second
+    got = values(make_trace(np.ones((2, 2)), running, power=np.full((2, 2), 10.0)))
     np.testing.assert_allclose(got["energy_j"], [10.0, 5.0])
 
 
-def test_jitter_of_a_cubic_is_its_third_derivative():
-    # angle t^3 has the rate 3 t^2 and the jerk 6; the other hinge is still
-    time = DT * np.arange(6)
-    qvel = np.zeros((6, 1, 8))
-    qvel[:, 0, 6] = 3 * time**2
-    np.testing.assert_allclose(values(make_trace(np.ones((6, 1)), qvel=qvel))["jitter"], [3.0])
+@pytest.mark.parametrize(
+    ("step_value", "score_name"),
+    [
+        ("torque", "torque_nm"),
+        ("jerk", "jitter"),
+        ("saturation", "saturation"),
+        ("offset", "offset_rad"),
+        ("slip", "foot_slip_m_s"),
+        ("penetration", "penetration_m"),
+    ],
+)
+def test_naturalness_is_a_mean_over_the_known_steps_of_the_episode(step_value, score_name):
+    value = np.array([[np.nan, np.nan, np.nan], [1.0, 2.0, np.nan], [3.0, 9.0, 9.0]])
+    running = np.array([[1, 1, 1], [1, 1, 1], [1, 0, 0]])
+    got = values(make_trace(np.ones((3, 3)), running, **{step_value: value}))
+    np.testing.assert_allclose(got[score_name], [2.0, 2.0, np.nan])
+
+
+def test_the_deepest_overlap_is_the_largest_of_all_episodes():
+    depth = np.array([[0.01, 0.002], [np.nan, 0.05]])
+    running = np.array([[1, 1], [1, 0]])
+    trace = make_trace(np.ones((2, 2)), running, penetration=depth)
+    np.testing.assert_allclose(values(trace)["penetration_max_m"], [0.01, 0.002])
+    scores = score(trace, np.array([0, 1]), styles("a", "b"), DT, STAND_S)
+    assert scores.penetration_max_m == pytest.approx(0.01)
+    assert scores.penetration_m == pytest.approx(0.006)
+    assert scores.per_curve["b"].penetration_max_m == pytest.approx(0.002)
+
+
+def test_success_of_pushed_episodes_leaves_the_others_out():
+    pushed = np.zeros((3, 4), bool)
+    pushed[1] = [True, True, False, True]
+    running = np.array([[1, 1, 1, 1], [1, 1, 1, 0], [1, 1, 1, 0]])  # the last fell before its push
+    success = np.array([True, False, True, False])
+    trace = make_trace(np.ones((3, 4)), running, success=success, pushed=pushed)
+    np.testing.assert_allclose(values(trace)["success_pushed"], [1.0, 0.0, np.nan, np.nan])
 
 
 # Scores.
@@ -173,23 +200,58 @@ def test_scores_are_means_by_style_and_in_total():
     assert (scores.success_low, scores.success_high) == wilson(3, 4)
 
 
+def test_scores_by_the_way_of_lying():
+    lying = styles("back", "belly", "left", "right")
+    for style, front, side in zip(lying, (0.1, 3.0, 1.5, 1.6), (1.5, 1.5, 0.2, 2.9), strict=True):
+        style.points[0, 1:] = side, front
+    trace = make_trace(np.ones((3, 5)), success=np.array([True, False, True, False, True]))
+    style = np.array([0, 1, 2, 3, 0])
+    scores = score(trace, style, lying, DT, STAND_S)
+    found = {name: (x.episodes, x.success) for name, x in scores.per_orientation.items()}
+    assert found == {"supine": (2, 1.0), "prone": (1, 0.0), "side": (2, 0.5)}
+    assert score(trace, style, lying, DT, STAND_S, STANDING).per_orientation is None
+
+
 def test_json_has_every_score_and_no_nan():
     trace = make_trace(np.full((3, 2), 0.5), success=False)
     result = to_json(score(trace, np.array([0, 1]), styles("a", "b"), DT, STAND_S))
     assert set(result) == KEYS
     assert set(result["per_curve"]) == {"a", "b"}
-    assert set(result["per_curve"]["a"]) == KEYS - {"per_curve"}
+    assert set(result["per_curve"]["a"]) == KEYS - {"per_curve", "per_orientation"}
+    assert set(result["per_orientation"]["supine"]) == KEYS - {"per_curve", "per_orientation"}
     assert result["stand_time_s"] is None  # nothing stood
     assert result["success"] == 0.0
     text = json.dumps(result, allow_nan=False)
     assert json.loads(text) == result
 
 
-def test_the_table_has_a_row_a_style_and_one_in_total():
+def rows_of(text: str) -> dict[str, list[str]]:
+    """{first cell: lines} of the tables."""
+    rows: dict[str, list[str]] = {}
+    for line in text.splitlines():
+        if line.startswith("│"):
+            rows.setdefault(line.split("│")[1].strip(), []).append(line)
+    return rows
+
+
+def test_the_tables_have_a_row_a_style_a_way_of_lying_and_one_in_total():
     trace = make_trace(np.ones((3, 3)), success=np.array([True, True, False]))
+    trace.slip[:] = 0.123
     text = table(score(trace, np.array([0, 0, 1]), styles("fast", "slow"), DT, STAND_S))
-    rows = {line.split("│")[1].strip(): line for line in text.splitlines() if "│" in line}
-    assert {"fast", "slow", "all"} <= set(rows)
-    assert "100%" in rows["fast"]
-    assert "67%" in rows["all"]
-    assert "nan" in rows["slow"]  # no stand time
+    rows = rows_of(text)
+    assert list(rows) == ["fast", "slow", "supine", "all"]
+    assert "100%" in rows["fast"][0]
+    assert "67%" in rows["all"][0]
+    assert "0%" in rows["slow"][0]
+    assert " - " in rows["slow"][0]  # no stand time
+    assert all("0.123" in lines[1] for lines in rows.values())
+    assert "pushed" not in text
+
+
+def test_the_table_tells_of_pushes_where_there_were_some():
+    pushed = np.zeros((3, 2), bool)
+    pushed[1] = True
+    trace = make_trace(np.ones((3, 2)), success=np.array([True, False]), pushed=pushed)
+    text = table(score(trace, np.array([0, 0]), styles("a"), DT, STAND_S))
+    assert "of pushed" in text
+    assert rows_of(text)["a"][0].count("50%") == 2  # of all, and of pushed

@@ -124,7 +124,7 @@ def find_checkpoints(path: str | Path) -> list[Path]:
     if not folder.exists() and folder.parts[:-1] in ((), ("assets", CHECKPOINTS)):
         folder = asset_path(CHECKPOINTS, folder.name)
     if not folder.is_dir():
-        raise CheckpointError(f"{path}: no such folder; give a run folder or a checkpoint in one")
+        raise CheckpointError(f"{path}: no such folder{_shipped_hint()}")
     if manifest.is_checkpoint(folder) or folder.name.isdigit():
         return [folder]
     found = steps(folder / CHECKPOINTS) or steps(folder)
@@ -134,6 +134,17 @@ def find_checkpoints(path: str | Path) -> list[Path]:
             f"folder with {manifest.FILE}"
         )
     return found
+
+
+def _shipped_hint() -> str:
+    """What to do when a path is not there."""
+    shipped = asset_path(CHECKPOINTS)
+    names = sorted(p.name for p in shipped.iterdir() if p.is_dir()) if shipped.is_dir() else []
+    known = f"shipped policies: {', '.join(names)}" if names else "no policy is shipped yet"
+    return (
+        f"; {known}; give a run folder or a checkpoint in one, such as what "
+        "getup-train configs/flat.yaml makes in runs/flat"
+    )
 
 
 def _prune(folder: Path, iteration: int, keep: int) -> None:

@@ -7,12 +7,14 @@ checked, so that a typing mistake is answered at once.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from getup_jax import __version__, runfolder
+from getup_jax.eval_options import eval_parser
 from getup_jax.settings import find_config, load_config
 
 _TRAIN_EXAMPLES = """\
@@ -26,13 +28,6 @@ A run folder holds config.yaml (every setting), metrics.jsonl (one line an itera
 checkpoints/. Ctrl-C and SIGTERM save and exit; a second Ctrl-C exits at once.
 """
 
-_EVAL_EXAMPLES = """\
-examples:
-  getup-eval                                           the shipped policy
-  getup-eval --ckpt runs/flat --episodes 200           the newest checkpoint of a run
-  getup-eval --ckpt runs/flat --video getup.mp4        and film it
-"""
-
 
 def train_main(argv: Sequence[str] | None = None) -> int:
     """`getup-train`; returns the exit code."""
@@ -41,7 +36,7 @@ def train_main(argv: Sequence[str] | None = None) -> int:
 
 def eval_main(argv: Sequence[str] | None = None) -> int:
     """`getup-eval`; returns the exit code."""
-    return _guard(_evaluate, _eval_parser().parse_args(argv))
+    return _guard(_evaluate, eval_parser().parse_args(argv))
 
 
 def motion_main(argv: Sequence[str] | None = None) -> int:
@@ -62,6 +57,8 @@ def _train(args: argparse.Namespace) -> int:
 
 
 def _evaluate(args: argparse.Namespace) -> int:
+    if args.video is not None or args.plot is not None:
+        _render_without_display()
     from getup_jax.evaluate import evaluate_command
 
     return evaluate_command(args) or 0
@@ -71,6 +68,12 @@ def _motion(argv: Sequence[str] | None) -> int:
     from getup_jax.motion.command import main
 
     return main(argv) or 0
+
+
+def _render_without_display() -> None:
+    """Choose MuJoCo's renderer; it reads the choice when it is imported, so not later than now."""
+    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+        os.environ.setdefault("MUJOCO_GL", "egl")
 
 
 def _guard(command: Callable[..., int], argument: object) -> int:
@@ -110,34 +113,3 @@ def _train_parser() -> argparse.ArgumentParser:
     add("--resume", action="store_true", help="continue the run that is in the folder, if any")
     add("--quiet", action="store_true", help="print only warnings and errors")
     return parser
-
-
-def _eval_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="getup-eval",
-        description="Let a trained policy get up many times, and report how well it does.",
-        epilog=_EVAL_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add = parser.add_argument
-    add(
-        "--ckpt",
-        metavar="PATH",
-        default="flat",
-        help="a run folder, a checkpoint, or the name of a shipped policy (default: flat)",
-    )
-    add("--episodes", type=_positive, default=100, metavar="N", help="how many (default: 100)")
-    add("--seed", type=int, default=0, metavar="S", help="of the starts (default: 0)")
-    add("--json", type=Path, metavar="FILE", help="write the results to this file, too")
-    add("--video", type=Path, metavar="FILE", help="film some episodes; an .mp4 file")
-    add("--start", choices=("lying", "standing"), default="lying", help="(default: lying)")
-    add("--stand-time", type=float, metavar="S", help="seconds of standing (default: as trained)")
-    add("--engine", metavar="E", help="native, mjx or mjx-warp (default: as for training)")
-    return parser
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"expected at least 1, got {text}")
-    return number

@@ -32,6 +32,7 @@ class PhysicsConfig:
     gain_scale: float = 1.5  # times the stiffness and damping of the MJCF file
     torque_scale: float = 1.0  # times the torque limits of the MJCF file
     armature: float = 0.1  # kg m^2, added to every hinge
+    damping: float = 1.0  # Nms/rad of every hinge; all that a servo at its torque limit has
     threads: int = 0  # native: worker threads; 0: every CPU this process may use
 
     def __post_init__(self) -> None:
@@ -44,7 +45,8 @@ class PhysicsConfig:
         _require(not mjx_pgs, "physics.solver", expected, self.solver)
         for name in ("control_hz", "substeps", "iterations", "gain_scale", "torque_scale"):
             _require(getattr(self, name) > 0, f"physics.{name}", "more than 0", getattr(self, name))
-        _require(self.armature >= 0, "physics.armature", "at least 0", self.armature)
+        for name in ("armature", "damping"):
+            _require(getattr(self, name) >= 0, f"physics.{name}", "at least 0", getattr(self, name))
         _require(self.threads >= 0, "physics.threads", "at least 0", self.threads)
 
 

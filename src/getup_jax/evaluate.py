@@ -5,73 +5,83 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import math
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import jax
-import jax.numpy as jnp
-import numpy as np
-from flax import struct
 
-from getup_jax import checkpoint
+from getup_jax import checkpoint, eval_plot, video
 from getup_jax.algo.learner import Learner, make_learner
+from getup_jax.checkpoint import LoadedPolicy
+from getup_jax.conditions import Conditions, blended, make_plan
 from getup_jax.config import Config
+from getup_jax.episodes import Episodes, run_episodes
+from getup_jax.motion.clips import GetUp
 from getup_jax.nets import prior as pose_prior
-from getup_jax.scores import score, table, to_json
+from getup_jax.physics.character import CharacterSpec
+from getup_jax.progress import Display
+from getup_jax.score_table import table
+from getup_jax.scores import Scores, score, to_json
 from getup_jax.storage import from_nested
 from getup_jax.tasks.build import BuiltTask, build_task
-from getup_jax.tasks.episode import LYING, STANDING, EpisodeState
-
-BATCH = 256  # episodes simulated at once
-Log = Callable[[str], None]
-
-
-@struct.dataclass
-class Trace:
-    """What happened in B episodes, step by step; leaves [T, B, ...]."""
-
-    features: jax.Array  # [T, B, 3] height (m), side and front angle (rad)
-    target: jax.Array  # [T, B, 3] the curves at the same time
-    time: jax.Array  # [T, B] s since the curve's start
-    qpos: jax.Array  # [T, B, 7 + J]
-    qvel: jax.Array  # [T, B, 6 + J]
-    torque: jax.Array  # [T, B, J] Nm
-    task_reward: jax.Array  # [T, B]
-    running: jax.Array  # [T, B] bool, the step belongs to the episode
-    success: jax.Array  # [T, B] bool, the episode ended here, standing
-    duration: jax.Array  # [T, B] s, T of the curve
 
 
 def evaluate_command(args: argparse.Namespace) -> int:
     """The command line of `getup-eval`; returns the exit code."""
     begin = time.monotonic()
+    if args.video is not None:
+        video.require()
+    if args.plot is not None:
+        eval_plot.require()
     loaded = checkpoint.load_policy(args.ckpt)
+    conditions = Conditions.of(args)
     config = evaluation_config(loaded.config, args)
-    print(f"{loaded.path}: {loaded.metadata.get('steps', 0):,} steps of training", flush=True)
-    task = build_task(config, _say, pose_prior.from_dict(loaded.prior))
-    learner = _learner(config, task)
-    template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0)).policy
-    policy = from_nested(template, loaded.policy, str(loaded.path))
-    kind = STANDING if args.start == "standing" else LYING
-    trace, getup = run_episodes(task, learner, policy, args.episodes, args.seed, kind, _say)
-    env = task.environment
-    scores = score(trace, getup, task.getups, env.engine.control_dt, config.task.stand_time_s)
+    conditions.check(config)
+    with Display(args.episodes, unit="episodes") as display:
+        display.log(f"{loaded.path}: {loaded.metadata.get('steps', 0):,} steps of training")
+        episodes, scores = evaluate(config, loaded, conditions, args.episodes, display)
     print(table(scores))
     print(f"{args.episodes} episodes in {time.monotonic() - begin:.0f} s")
     if args.json is not None:
-        args.json.write_text(json.dumps(to_json(scores), indent=2) + "\n")
-    if args.video is not None:
-        from getup_jax.video import film
-
-        film(args.video, env.character.model, trace, getup, task.getups)
-        print(f"video: {args.video}")
+        facts = description(config, loaded, conditions, episodes)
+        args.json.write_text(json.dumps({**to_json(scores), **facts}, indent=2) + "\n")
+    _write_pictures(args.video, args.plot, episodes)
     return 0
 
 
+def evaluate(
+    config: Config, loaded: LoadedPolicy, conditions: Conditions, number: int, display: Display
+) -> tuple[Episodes, Scores]:
+    """Run and score the episodes; `config` is that of `evaluation_config`."""
+    choose = _mixtures(config, conditions) if conditions.blend else None
+    task = build_task(config, display.log, pose_prior.from_dict(loaded.prior), choose)
+    learner = _learner(config, task)
+    template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0)).policy
+    policy = from_nested(template, loaded.policy, str(loaded.path))
+    _, num_styles, rows = task.world.pool.table.shape
+    plan = make_plan(conditions, number, num_styles, rows)
+    display.log("compiling the episode ...")
+    episodes = run_episodes(task, learner, policy, plan, _Rate(display, number))
+    control_dt = task.environment.engine.control_dt
+    scores = score(
+        episodes.trace,
+        plan.getup,
+        task.getups,
+        control_dt,
+        config.task.stand_time_s,
+        conditions.kind,
+    )
+    return episodes, scores
+
+
 def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
-    """The training config with one kind of start only, as many as there are episodes."""
+    """The training config with the starts that are asked for, as many as there are episodes.
+
+    Start noise is that of the arguments, not of the training, so that two policies meet the
+    same starts.
+    """
     physics, task = config.physics, config.task
     if args.engine is not None:
         solver = "auto" if physics.solver == "pgs" else physics.solver  # MJX has no PGS
@@ -81,86 +91,57 @@ def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
         task,
         stand_start=float(args.start == "standing"),
         clip_start=0.0,
+        start_noise_rad=args.start_noise,
         pool_size=args.episodes,
         stand_time_s=stand_time_s,
     )
     return dataclasses.replace(config, physics=physics, task=task, seed=args.seed)
 
 
-def run_episodes(
-    task: BuiltTask,
-    learner: Learner,
-    policy: Any,
-    episodes: int,
-    seed: int,
-    kind: int,
-    log: Log,
-) -> tuple[Trace, np.ndarray]:
-    """One start of the given kind each: the styles in turn, the rows of the pool by the seed.
-
-    Returns the trace, leaves [T, N, ...] as NumPy arrays, and the style [N] of every episode.
-    """
-    _, num_styles, rows = task.world.pool.table.shape
-    getup = np.arange(episodes) % num_styles
-    row = np.random.default_rng(seed).integers(rows, size=episodes)
-    size = min(BATCH, episodes)
-    options = task.environment.engine.compiler_options
-    roll = jax.jit(_roll, static_argnums=(0, 1, 2, 3), compiler_options=options)
-    length = episode_steps(task, kind)
-    parts = []
-    for first in range(0, episodes, size):
-        # the last batch is filled up, so that one program serves all of them
-        index = np.minimum(np.arange(first, first + size), episodes - 1)
-        part = roll(
-            task.environment, learner, length, kind, task.world, policy, getup[index], row[index]
-        )
-        keep = min(size, episodes - first)
-        parts.append(jax.tree.map(lambda x, keep=keep: np.asarray(x)[:, :keep], part))
-        log(f"{min(first + size, episodes)} of {episodes} episodes")
-    return jax.tree.map(lambda *x: np.concatenate(x, axis=1), *parts), getup
+def description(
+    config: Config, loaded: LoadedPolicy, conditions: Conditions, episodes: Episodes
+) -> dict[str, Any]:
+    """What the JSON file says beside the scores: {"policy": ..., "conditions": ...}."""
+    return {
+        "policy": {"path": str(loaded.path), "seed": loaded.config.seed, **loaded.metadata},
+        "conditions": {
+            **dataclasses.asdict(conditions),
+            "stand_time_s": config.task.stand_time_s,
+            "engine": episodes.task.environment.engine.name,
+            "pushed_episodes": int(episodes.trace.pushed.any(axis=0).sum()),
+        },
+    }
 
 
-def episode_steps(task: BuiltTask, kind: int) -> int:
-    """Control steps of the longest episode."""
-    rise = float(np.max(np.asarray(task.world.duration))) if kind == LYING else 0.0
-    total = rise + task.environment.config.stand_time_s
-    return math.ceil(total / task.environment.engine.control_dt)
+class _Rate:
+    """Shows episodes done, their rate and the time left; the first call, a compile, sets zero."""
+
+    _PARTS = 20  # a terminal's bar moves, and elsewhere a line comes, this often
+
+    def __init__(self, display: Display, episodes: int) -> None:
+        self._display, self._episodes = display, episodes
+        self._first: tuple[float, float] | None = None
+        self._shown = 0
+
+    def __call__(self, done: float) -> None:
+        now = time.monotonic()
+        if self._first is None:
+            self._first = (done, now)
+            self._display.start(0)
+        rate = (done - self._first[0]) / max(now - self._first[1], 1e-9)
+        part = int(self._PARTS * done / self._episodes)
+        if part > self._shown:
+            self._display.update(int(done), rate, {})
+            self._shown = part
 
 
-def _roll(
-    env: Any,
-    learner: Learner,
-    length: int,
-    kind: int,
-    world: Any,
-    policy: Any,
-    getup: Any,
-    row: Any,
-) -> Trace:
-    kinds = jnp.full(len(getup), kind, jnp.int32)
-    state = env.start(world, jnp.asarray(getup, jnp.int32), kinds, jnp.asarray(row))
-    verdict = "stand_success" if kind == STANDING else "success"
+def _mixtures(
+    config: Config, conditions: Conditions
+) -> Callable[[tuple[GetUp, ...], CharacterSpec], tuple[GetUp, ...]]:
+    def choose(getups: tuple[GetUp, ...], character: CharacterSpec) -> tuple[GetUp, ...]:
+        return blended(getups, character, config.task.curve_match_rad, conditions)
 
-    def step(carry: tuple[EpisodeState, jax.Array], _: None) -> tuple[Any, Trace]:
-        state, running = carry
-        state, output = env.advance(world, state, learner.act(policy, state.observation))
-        kinematics = state.physics.kinematics
-        trace = Trace(
-            features=env.observer.posture(kinematics, world.terrain).features,
-            target=env.targets(world, state)[:, 0],
-            time=state.time,
-            qpos=kinematics.qpos,
-            qvel=kinematics.qvel,
-            torque=kinematics.torque,
-            task_reward=output.metrics["reward_task"],
-            running=running,
-            success=running & (output.episode[verdict] == 1.0),
-            duration=state.duration,
-        )
-        return (state, running & ~(output.terminated | output.truncated)), trace
-
-    _, trace = jax.lax.scan(step, (state, jnp.ones(len(getup), bool)), None, length=length)
-    return trace
+    return choose
 
 
 def _learner(config: Config, task: BuiltTask) -> Learner:
@@ -169,5 +150,10 @@ def _learner(config: Config, task: BuiltTask) -> Learner:
     )
 
 
-def _say(text: str) -> None:
-    print(text, flush=True)
+def _write_pictures(film: Path | None, plot: Path | None, episodes: Episodes) -> None:
+    if plot is not None:
+        eval_plot.plot(plot, episodes)
+        print(f"plot: {plot}")
+    if film is not None:
+        video.film(film, episodes)
+        print(f"video: {film}")

@@ -1,4 +1,4 @@
-"""What a training run tells its user: a live bar on a terminal, plain lines elsewhere."""
+"""What a long command tells its user: a live bar on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -14,13 +14,19 @@ KEY_METRICS = {"reward_total": "reward", "return_rate": "return rate", "success"
 
 
 class Display:
-    """Messages and the progress of a run of `total` steps; quiet shows neither.
+    """Messages and the progress of a run of `total` steps (or other units); quiet shows neither.
 
     Use as a context manager; `start` begins the bar, so that messages come before it.
     """
 
-    def __init__(self, total: int, quiet: bool = False, console: Console | None = None) -> None:
-        self._total = total
+    def __init__(
+        self,
+        total: int,
+        quiet: bool = False,
+        console: Console | None = None,
+        unit: str = "steps",
+    ) -> None:
+        self._total, self._unit = total, unit
         self._quiet = quiet
         self._console = console or Console(highlight=False, soft_wrap=True)
         self._bar: Progress | None = None
@@ -37,12 +43,14 @@ class Display:
         column = Column(no_wrap=True, overflow="ellipsis")
         text = TextColumn("{task.description}", markup=False, table_column=column)
         self._bar = Progress(BarColumn(bar_width=20), text, console=self._console)
-        self._bar.add_task(describe(steps, self._total, math.nan, {}), total=self._total)
+        self._bar.add_task(
+            describe(steps, self._total, math.nan, {}, self._unit), total=self._total
+        )
         self._bar.start()
 
     def update(self, steps: int, steps_per_s: float, metrics: Mapping[str, float]) -> None:
         """Show how far the run is."""
-        text = describe(steps, self._total, steps_per_s, metrics)
+        text = describe(steps, self._total, steps_per_s, metrics, self._unit)
         if self._bar is None:
             self.log(text)
         else:
@@ -61,12 +69,15 @@ class Display:
             self._bar = None
 
 
-def describe(steps: int, total: int, steps_per_s: float, metrics: Mapping[str, float]) -> str:
-    """One line: steps done, speed, time left and the key metrics."""
-    parts = [f"{count(steps)}/{count(total)} steps"]
+def describe(
+    steps: int, total: int, steps_per_s: float, metrics: Mapping[str, float], unit: str = "steps"
+) -> str:
+    """One line: steps (or other units) done, speed, time left and the key metrics."""
+    parts = [f"{count(steps)}/{count(total)} {unit}"]
     if steps_per_s > 0:
         left = max(total - steps, 0) / steps_per_s
-        parts += [f"{count(round(steps_per_s))}/s", f"{duration(left)} left"]
+        rate = count(round(steps_per_s)) if steps_per_s >= 10 else f"{steps_per_s:.1f}"
+        parts += [f"{rate}/s", f"{duration(left)} left"]
     for name, label in KEY_METRICS.items():
         value = find(metrics, name)
         if value is not None and math.isfinite(value):

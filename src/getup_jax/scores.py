@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 from scipy.stats import norm
 
+from getup_jax.conditions import orientation
 from getup_jax.motion.clips import GetUp
+from getup_jax.tasks.episode import LYING
 
+ORIENTATIONS = ("supine", "prone", "side")
 STAND_SHARE = 0.9  # of the curve's end: the character stands from when it stays above this
 
 
@@ -32,7 +32,14 @@ class Scores:
     jitter: float  # mean |third derivative| of the hinge angles (rad/s^3)
     torque_nm: float  # mean |torque| of a hinge
     energy_j: float  # integral of sum |torque x rate| over the episode
+    saturation: float  # share of hinges and steps with the torque at its limit
+    offset_rad: float  # mean |dq|_1 of the filtered offsets
+    foot_slip_m_s: float  # mean horizontal speed of the feet's points on the ground
+    penetration_m: float  # mean over looks at the deepest overlap of two links
+    penetration_max_m: float  # deepest overlap of all
+    success_pushed: float  # share of success among the episodes that were pushed
     episodes: int
+    per_orientation: dict[str, Scores] | None = None  # supine, prone, side: how the curve starts
     per_curve: dict[str, Scores] | None = None
 
 
@@ -42,24 +49,37 @@ def score(
     getups: Sequence[GetUp],
     control_dt: float,
     stand_time_s: float,
+    kind: int = LYING,
 ) -> Scores:
-    """Scores of a trace (see `evaluate.Trace`, NumPy leaves [T, N, ...]) in total and by style."""
+    """Scores of a trace (see `episodes.Trace`, NumPy leaves [T, N, ...]).
+
+    In total, by style, and for lying starts by how the body lies.
+    """
     values = episode_values(trace, control_dt, stand_time_s)
-    per_curve = {
-        style.name: _mean({name: x[getup == i] for name, x in values.items()})
-        for i, style in enumerate(getups)
-        if (getup == i).any()
+    styles = np.array([style.name for style in getups])[getup]
+    lies = np.array([orientation(style) for style in getups])[getup]
+    return dataclasses.replace(
+        _mean(values),
+        per_orientation=_split(values, lies, ORIENTATIONS) if kind == LYING else None,
+        per_curve=_split(values, styles, [style.name for style in getups]),
+    )
+
+
+def _split(
+    values: dict[str, np.ndarray], group: np.ndarray, names: Sequence[str]
+) -> dict[str, Scores]:
+    """Scores of every group that has an episode; group [N] has the name of each episode's."""
+    return {
+        name: _mean({key: x[group == name] for key, x in values.items()})
+        for name in names
+        if (group == name).any()
     }
-    return dataclasses.replace(_mean(values), per_curve=per_curve)
 
 
 def episode_values(trace: Any, control_dt: float, stand_time_s: float) -> dict[str, np.ndarray]:
     """One number an episode [N] of everything that `Scores` averages."""
     running, rising = trace.running, trace.running & (trace.time <= trace.duration)
     error = np.abs(trace.features - trace.target)
-    power = np.abs(trace.torque * trace.qvel[..., 6:]).sum(axis=-1)
-    rate = trace.qvel[..., 6:]
-    jerk = np.abs(np.diff(rate, n=2, axis=0)).mean(axis=-1) / control_dt**2
     success = trace.success.any(axis=0)
     start = trace.time[0] - control_dt  # a standing start begins at the curve's end
     full_steps = np.round((trace.duration[0] + stand_time_s - start) / control_dt)
@@ -69,9 +89,15 @@ def episode_values(trace: Any, control_dt: float, stand_time_s: float) -> dict[s
         "height_error_m": _masked_mean(error[..., 0], rising),
         "angle_error_rad": _masked_mean(error[..., 1:].mean(axis=-1), rising),
         "stand_time_s": np.where(success, stand_time(trace), np.nan),
-        "jitter": _masked_mean(jerk, running[2:]),
-        "torque_nm": _masked_mean(np.abs(trace.torque).mean(axis=-1), running),
-        "energy_j": np.where(running, power, 0.0).sum(axis=0) * control_dt,
+        "jitter": _masked_mean(trace.jerk, running),
+        "torque_nm": _masked_mean(trace.torque, running),
+        "energy_j": np.where(running, trace.power, 0.0).sum(axis=0) * control_dt,
+        "saturation": _masked_mean(trace.saturation, running),
+        "offset_rad": _masked_mean(trace.offset, running),
+        "foot_slip_m_s": _masked_mean(trace.slip, running),
+        "penetration_m": _masked_mean(trace.penetration, running),
+        "penetration_max_m": _masked_max(trace.penetration, running),
+        "success_pushed": np.where((trace.pushed & running).any(axis=0), success, np.nan),
     }
 
 
@@ -106,48 +132,36 @@ def to_json(scores: Scores) -> dict[str, Any]:
         return None if isinstance(value, float) and math.isnan(value) else value
 
     result = clean(dataclasses.asdict(scores))
-    for part in (result["per_curve"] or {}).values():
-        del part["per_curve"]
+    for groups in ("per_orientation", "per_curve"):
+        for part in (result[groups] or {}).values():
+            del part["per_orientation"], part["per_curve"]
     return result
-
-
-def table(scores: Scores) -> str:
-    """The scores as a text table, one row a style and one in total."""
-    columns = {
-        "success": "{:.0%}", "95 %": "", "return_rate": "{:.2f}", "height_error_m": "{:.3f}",
-        "angle_error_rad": "{:.2f}", "stand_time_s": "{:.1f}", "jitter": "{:.0f}",
-        "torque_nm": "{:.1f}", "energy_j": "{:.0f}", "episodes": "{:d}",
-    }  # fmt: skip
-    view = Table()
-    view.add_column("get-up", no_wrap=True)
-    for name in columns:
-        view.add_column(name.replace("_", " "))
-    for name, row in {**(scores.per_curve or {}), "all": scores}.items():
-        if name == "all":
-            view.add_section()
-        interval = f"{row.success_low:.0%}-{row.success_high:.0%}"
-        cells = [
-            interval if column == "95 %" else text.format(getattr(row, column))
-            for column, text in columns.items()
-        ]
-        view.add_row(name, *cells)
-    out = io.StringIO()
-    Console(file=out, width=170).print(view)
-    return out.getvalue()
 
 
 def _mean(values: dict[str, np.ndarray]) -> Scores:
     episodes = len(values["success"])
     low, high = wilson(float(values["success"].sum()), episodes)
-    means: dict[str, Any] = {
-        name: float(np.nanmean(x)) if np.isfinite(x).any() else math.nan
-        for name, x in values.items()
-    }
+    means: dict[str, Any] = {name: _finite_mean(x) for name, x in values.items()}
+    deepest = values["penetration_max_m"]
+    known = np.isfinite(deepest)
+    means["penetration_max_m"] = float(deepest[known].max()) if known.any() else math.nan
     return Scores(success_low=low, success_high=high, episodes=episodes, **means)
 
 
+def _finite_mean(x: np.ndarray) -> float:
+    return float(np.nanmean(x)) if np.isfinite(x).any() else math.nan
+
+
 def _masked_mean(value: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Mean [N] of value [T, N] where mask; NaN where the mask is empty."""
+    """Mean [N] of value [T, N] where mask and not NaN; NaN where there is nothing."""
+    mask = mask & ~np.isnan(value)
     count = mask.sum(axis=0)
     total = np.where(mask, value, 0.0).sum(axis=0)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _masked_max(value: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Largest [N] of value [T, N] where mask and not NaN; NaN where there is nothing."""
+    mask = mask & ~np.isnan(value)
+    largest = np.where(mask, value, -np.inf).max(axis=0)
+    return np.where(mask.any(axis=0), largest, np.nan)

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from probes import Probe, make_world
 
 from getup_jax.algo.actor_critic import normalized
+from getup_jax.algo.estimate import next_values
 from getup_jax.algo.learner import Learner, make_learner
 from getup_jax.algo.state import TrainState
 from getup_jax.config import NetworkConfig, PPOConfig
@@ -249,3 +250,19 @@ def test_weights_are_scaled_and_checked():
     assert make_learner(env, NETWORK, CONFIG, 1, (1.0, 3.0)).weights == (0.25, 0.75)
     with pytest.raises(ValueError, match="expected 2"):
         make_learner(env, NETWORK, CONFIG, 1, (1.0,))
+
+
+# ---- values of what the steps reached
+
+
+def test_next_values_are_the_critics_on_the_final_observations(run: Run):
+    world = make_world(length=3, truncates=True, shows_step=1.0)
+    state = run.initial(world, jax.random.key(5))
+    learner, stage = run.learner, run.learner.stage(state)
+    transition = learner._collect(world, state, stage, jax.random.key(6)).transition
+    assert bool(transition.truncated.any()) and not bool(transition.truncated.all())
+    value = learner.value(state.learner, transition.observation)
+    reached = next_values(learner.model, state.learner, transition, value)
+    expected = learner.value(state.learner, transition.final_observation)
+    assert_allclose(reached, expected, rtol=1e-5, atol=1e-6)
+    assert not np.allclose(reached[:-1], value[1:])  # a new episode's value is another one

@@ -210,13 +210,14 @@ def test_a_missing_file_names_the_shipped_characters():
 def test_physics_settings_reach_the_model():
     config = PhysicsConfig(
         control_hz=20, substeps=5, solver="pgs", iterations=7, gain_scale=2.0,
-        torque_scale=0.5, armature=0.03,
+        torque_scale=0.5, armature=0.03, damping=0.7,
     )  # fmt: skip
     model = load_character(config).model
     assert model.opt.timestep == pytest.approx(0.01)
     assert model.opt.solver == mujoco.mjtSolver.mjSOL_PGS
     assert model.opt.iterations == 7
     np.testing.assert_allclose(model.dof_armature, [0.0] * 6 + [0.03] * 49)
+    np.testing.assert_allclose(model.dof_damping, [0.0] * 6 + [0.7] * 49)
     base = load_character(PhysicsConfig(gain_scale=1.0, torque_scale=1.0)).model
     np.testing.assert_allclose(model.actuator_gainprm[:, 0], 2.0 * base.actuator_gainprm[:, 0])
     np.testing.assert_allclose(model.actuator_biasprm, 2.0 * base.actuator_biasprm)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import jax
+import jax.numpy as jnp
 
 from getup_jax.algo import popart, ppo
 from getup_jax.algo.actor_critic import ActorCritic, normalized
@@ -13,6 +14,9 @@ from getup_jax.algo.ppo import Samples
 from getup_jax.algo.rollout import Transition
 from getup_jax.algo.state import LearnerState
 from getup_jax.config import PPOConfig
+from getup_jax.rows import replace_rows
+
+_TRUNCATED_CHUNK = 128  # truncated steps whose values are computed at once
 
 
 def estimate(
@@ -25,12 +29,11 @@ def estimate(
         and the explained variance of the values that the rollout was scored with, a scalar.
     """
     observation = normalized(learner.policy, transition.observation)
-    final_observation = normalized(learner.policy, transition.final_observation)
     value = model.value(learner, observation)
     advantage, target = gae(
         transition.reward,
         value,
-        model.value(learner, final_observation),
+        next_values(model, learner, transition, value),
         transition.terminated,
         transition.truncated,
         config.discount,
@@ -46,6 +49,29 @@ def estimate(
         target=target,
     )
     return learner, jax.tree.map(_flatten, samples), explained
+
+
+def next_values(
+    model: ActorCritic, learner: LearnerState, transition: Transition, value: jax.Array
+) -> jax.Array:
+    """Values [T, B, K] of the observations that the steps reached, before any reset.
+
+    An episode that goes on reaches what the next step starts from, whose value [T, B, K] is known
+    but for the last step. The critic sees only that and the few truncated steps' observations;
+    where an episode terminated, no next value is read and the result is any number.
+    """
+
+    def critic(raw: jax.Array) -> jax.Array:
+        return model.value(learner, normalized(learner.policy, raw))
+
+    final = transition.final_observation
+    following = jnp.concatenate([value[1:], critic(final[-1])[None]])
+    flat = _flatten(final)
+    truncated = transition.truncated.reshape(-1)
+    rows = replace_rows(
+        _flatten(following), truncated, lambda index: critic(flat[index]), _TRUNCATED_CHUNK
+    )
+    return rows.reshape(value.shape)
 
 
 def normalize_targets(learner: LearnerState, target: jax.Array) -> tuple[LearnerState, jax.Array]:

@@ -105,6 +105,7 @@ def _compile(config: PhysicsConfig) -> mujoco.MjModel:
     spec.option.iterations = config.iterations
     model = spec.compile()
     model.dof_armature[6:] = config.armature
+    model.dof_damping[6:] = config.damping
     model.actuator_gainprm[:, 0] *= config.gain_scale
     model.actuator_biasprm[:, 1:3] *= config.gain_scale
     model.actuator_forcerange *= config.torque_scale

@@ -35,9 +35,15 @@ class BuiltTask:
 
 
 def build_task(
-    config: Config, log: Callable[[str], None], prior: PosePrior | None = None
+    config: Config,
+    log: Callable[[str], None],
+    prior: PosePrior | None = None,
+    choose: Callable[[tuple[GetUp, ...], CharacterSpec], tuple[GetUp, ...]] | None = None,
 ) -> BuiltTask:
-    """Load the motions, train the pose prior (or take the given one) and make the start states."""
+    """Load the motions, train the pose prior (or take the given one) and make the start states.
+
+    choose: makes the styles out of those of the library; None: all of these.
+    """
     character = load_character(config.physics)
     log(f"motions: {', '.join(config.motion.source)}")
     library = load_motions(config.motion, character)
@@ -50,6 +56,9 @@ def build_task(
         prior, _ = cached_prior(
             poses, config.prior, cache_dir() / "prior", log, shipped=asset_path("priors")
         )
+    if choose is not None:
+        getups = choose(getups, character)
+        log(f"motions: {len(getups)} styles made of them")
     return assemble(config, character, getups, prior, log)
 
 

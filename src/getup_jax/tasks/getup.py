@@ -15,11 +15,14 @@ from getup_jax.nets.prior import PosePrior
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain import Terrain
 from getup_jax.rotation import angle, conjugate, multiply, rotate
+from getup_jax.rows import replace_rows
 from getup_jax.tasks import rewards
 from getup_jax.tasks.episode import EpisodeState, Record, update_record, verdict
 from getup_jax.tasks.observation import Observer, Posture
 from getup_jax.tasks.reset_pool import Pool
-from getup_jax.types import Engine, StepOutput, select, take
+from getup_jax.types import Engine, StepOutput, take
+
+_RESET_CHUNK = 32  # episodes that start anew at once; a step rarely ends more of some hundred
 
 
 @struct.dataclass
@@ -72,15 +75,25 @@ class GetUpTask:
         """One control step; episodes that end start anew."""
         after, output = self.advance(world, state, action)
         key_next, key_reset = jax.random.split(state.key)
+        getup, kind, row = self._draw(world, key_reset, action.shape[0])
+
+        def fresh(index: jax.Array) -> EpisodeState:
+            return self.start(world, getup[index], kind[index], row[index]).replace(key=None)
+
         done = output.terminated | output.truncated
-        fresh = self.start_random(world, key_reset, action.shape[0])
-        # the key has no simulation axis, so it stays out of the selection
-        after = select(done, fresh.replace(key=None), after.replace(key=None))
+        # the key has no simulation axis, so it stays out of the rows
+        after = replace_rows(after.replace(key=None), done, fresh, _RESET_CHUNK)
         after = after.replace(key=key_next)
         return after, output.replace(observation=after.observation)
 
     def start_random(self, world: World, key: jax.Array, num_envs: int) -> EpisodeState:
         """Episodes with a random style and kind of start."""
+        return self.start(world, *self._draw(world, key, num_envs))
+
+    def _draw(
+        self, world: World, key: jax.Array, num_envs: int
+    ) -> tuple[jax.Array, jax.Array, jax.Array]:
+        """Random styles [B], kinds of start [B] and rows [B] of the pool, all int32."""
         key_kind, key_style, key_row = jax.random.split(key, 3)
         _, num_styles, rows = world.pool.table.shape
         draw = jax.random.uniform(key_kind, (num_envs,))
@@ -88,7 +101,7 @@ class GetUpTask:
         kind = jnp.where(draw < stand, 1, jnp.where(draw < stand + clip, 2, 0)).astype(jnp.int32)
         getup = jax.random.randint(key_style, (num_envs,), 0, num_styles)
         row = jax.random.randint(key_row, (num_envs,), 0, rows)
-        return self.start(world, getup, kind, row)
+        return getup, kind, row
 
     def start(
         self,

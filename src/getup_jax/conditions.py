@@ -1,0 +1,136 @@
+"""What is harder than in training: other starts, durations and curves, and pushes."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from getup_jax.config import Config, ConfigError
+from getup_jax.motion import events
+from getup_jax.motion.clips import GetUp
+from getup_jax.physics.character import CharacterSpec
+from getup_jax.tasks.episode import LYING, STANDING
+from getup_jax.tasks.reset_pool import angle_gap
+
+PUSH_AFTER_S = 1.0  # a push comes at the first chance this long after the curve's end
+
+
+@dataclasses.dataclass(frozen=True)
+class Conditions:
+    """How the episodes of one evaluation begin and what happens to them."""
+
+    start: str = "lying"  # lying | standing
+    start_noise_rad: float = 0.0  # standard deviation on every hinge of the start poses
+    duration_scale: tuple[float, float] = (1.0, 1.0)  # each episode's T is multiplied by U(a, b)
+    blend: str | None = None  # half | random: mixtures of two curves; None: the curves themselves
+    push_ns: float | None = None  # impulse to the chest while standing
+    seed: int = 0
+
+    @classmethod
+    def of(cls, args: argparse.Namespace) -> Conditions:
+        """Those that `getup-eval` was asked for."""
+        return cls(
+            args.start, args.start_noise, args.duration_scale, args.blend, args.push, args.seed
+        )
+
+    @property
+    def kind(self) -> int:
+        """LYING or STANDING, see tasks/episode.py."""
+        return STANDING if self.start == "standing" else LYING
+
+    def check(self, config: Config) -> None:
+        """Raise ConfigError for what cannot be evaluated under the config."""
+        stand_s = config.task.stand_time_s
+        if self.push_ns is not None and stand_s <= PUSH_AFTER_S:
+            raise ConfigError(
+                f"--push: comes {PUSH_AFTER_S:g} s after the curve's end, but the standing phase "
+                f"lasts {stand_s:g} s; give a longer --stand-time"
+            )
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Plan:
+    """N episodes before they are run."""
+
+    kind: int  # LYING or STANDING
+    getup: np.ndarray  # [N] int32, the style
+    row: np.ndarray  # [N] int32, row of the pool's table
+    duration_scale: np.ndarray  # [N] float32
+    impulse: np.ndarray  # [N, 3] Ns, zero: no push
+
+
+def make_plan(conditions: Conditions, episodes: int, num_styles: int, rows: int) -> Plan:
+    """The styles in turn, each with one start of the pool after the other."""
+    rng = np.random.default_rng(conditions.seed)
+    number = np.arange(episodes)
+    angle = rng.uniform(-np.pi, np.pi, episodes)
+    direction = np.stack([np.cos(angle), np.sin(angle), np.zeros(episodes)], axis=-1)
+    return Plan(
+        kind=conditions.kind,
+        getup=(number % num_styles).astype(np.int32),
+        row=(number // num_styles % rows).astype(np.int32),
+        duration_scale=rng.uniform(*conditions.duration_scale, episodes).astype(np.float32),
+        impulse=(conditions.push_ns or 0.0) * direction,
+    )
+
+
+def blended(
+    getups: Sequence[GetUp], character: CharacterSpec, match_rad: float, conditions: Conditions
+) -> tuple[GetUp, ...]:
+    """Mixtures of every two curves that start alike, in random order.
+
+    w a + (1 - w) b of the control points and of the durations, with w = 1/2 or U(0, 1). A
+    mixture starts from the pose of one of the two motions, or of any where both are curves
+    alone: the one whose torso angles are nearest to its first ones. Two curves start alike
+    where these angles differ by at most match_rad, which also holds for pose and mixture.
+    """
+    rng = np.random.default_rng(conditions.seed)
+    pairs = list(itertools.combinations(getups, 2))
+    styles = []
+    for i in rng.permutation(len(pairs)):
+        first, second = pairs[i]
+        weight = 0.5 if conditions.blend == "half" else float(rng.uniform())
+        if np.abs(first.points[0, 1:] - second.points[0, 1:]).max() <= match_rad:
+            mixed = _with_start(_mix(first, second, weight), (first, second), getups, character)
+            if (
+                mixed.clip is not None
+                and angle_gap(mixed.clip.qpos[0], mixed, character) <= match_rad
+            ):
+                styles.append(mixed)
+    if not styles:
+        raise ConfigError(
+            f"--blend: no two of the {len(getups)} curves start within task.curve_match_rad = "
+            f"{match_rad:g} rad of each other; evaluate a policy of more curves"
+        )
+    return tuple(styles)
+
+
+def _mix(first: GetUp, second: GetUp, weight: float) -> GetUp:
+    def mean(a: Any, b: Any) -> Any:
+        return weight * a + (1.0 - weight) * b
+
+    return GetUp(
+        name=f"{weight:.0%} {first.name} + {1.0 - weight:.0%} {second.name}",
+        duration=mean(first.duration, second.duration),
+        points=mean(first.points, second.points),
+    )
+
+
+def _with_start(
+    mixed: GetUp, parents: Sequence[GetUp], getups: Sequence[GetUp], character: CharacterSpec
+) -> GetUp:
+    """The mixture with the motion that it starts like, if there is any motion."""
+    own = [g.clip for g in parents if g.clip is not None]
+    clips = own or [g.clip for g in getups if g.clip is not None]
+    gaps = [angle_gap(clip.qpos[0], mixed, character) for clip in clips]
+    return dataclasses.replace(mixed, clip=clips[int(np.argmin(gaps))]) if clips else mixed
+
+
+def orientation(getup: GetUp) -> str:
+    """supine, prone or side: how the curve starts, by its first front angle."""
+    return events.orientation(float(np.cos(getup.points[0, 2])))

@@ -1,0 +1,167 @@
+"""The arguments of `getup-eval`; a bad value is answered before anything heavy is imported."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+_EXAMPLES = """\
+examples:
+  getup-eval                                           the shipped policy
+  getup-eval --ckpt runs/flat --episodes 200           the newest checkpoint of a run
+  getup-eval --ckpt runs/flat --video getup.mp4 --plot getup.png
+                                                       film it, and draw its curves
+  getup-eval --start-noise 0.1 --duration-scale 0.8,1.2
+                                                       other start poses, faster and slower
+  getup-eval --blend --push 20                         curves never seen, and pushes
+
+Every start has a random heading. Without --start-noise, episodes of one style differ in
+nothing else, so that more of them say little more.
+"""
+
+
+def eval_parser() -> argparse.ArgumentParser:
+    """The parser of `getup-eval`."""
+    parser = argparse.ArgumentParser(
+        prog="getup-eval",
+        description="Let a trained policy get up many times, and report how well it does.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add(
+        "--ckpt",
+        metavar="PATH",
+        default="flat",
+        help="a run folder, a checkpoint, or the name of a shipped policy (default: flat)",
+    )
+    add("--episodes", type=positive, default=100, metavar="N", help="how many (default: 100)")
+    add("--seed", type=natural, default=0, metavar="S", help="of the starts (default: 0)")
+    add("--start", choices=("lying", "standing"), default="lying", help="(default: lying)")
+    add("--stand-time", type=above_zero, metavar="S", help="seconds of standing (as trained)")
+    add("--engine", metavar="E", help="native, mjx or mjx-warp (default: as for training)")
+    _add_conditions(parser.add_argument_group("harder conditions, each off by default"))
+    _add_outputs(parser.add_argument_group("output files"))
+    return parser
+
+
+def _add_conditions(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
+    add(
+        "--start-noise",
+        type=at_least_zero,
+        default=0.0,
+        metavar="RAD",
+        help="standard deviation of the noise on every hinge of the start poses",
+    )
+    add(
+        "--duration-scale",
+        type=low_high,
+        default=(1.0, 1.0),
+        metavar="LOW,HIGH",
+        help="each episode's curves last T x U(LOW, HIGH), such as 0.8,1.2",
+    )
+    add(
+        "--blend",
+        nargs="?",
+        choices=("half", "random"),
+        const="half",
+        help="follow mixtures of two curves that start alike: half and half, or with a random "
+        "weight for every pair",
+    )
+    add(
+        "--push",
+        type=above_zero,
+        metavar="NS",
+        help="an impulse (Ns) to the chest in a random horizontal direction, about a second "
+        "after the curve's end",
+    )
+
+
+def _add_outputs(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
+    add("--json", type=output(".json"), metavar="FILE", help="the results; a .json file")
+    add(
+        "--video",
+        type=output(".mp4"),
+        metavar="FILE",
+        help="a typical episode of several styles; an .mp4 file",
+    )
+    add(
+        "--plot",
+        type=output(".png", ".pdf", ".svg"),
+        metavar="FILE",
+        help="target and achieved curves of several styles, with pictures; .png, .pdf or .svg",
+    )
+
+
+def positive(text: str) -> int:
+    """A whole number of at least 1."""
+    return _whole(text, 1)
+
+
+def natural(text: str) -> int:
+    """A whole number of at least 0."""
+    return _whole(text, 0)
+
+
+def _whole(text: str, least: int) -> int:
+    try:
+        number = int(text)
+    except ValueError:
+        number = least - 1
+    if number < least:
+        raise argparse.ArgumentTypeError(f"expected a whole number, at least {least}, got {text!r}")
+    return number
+
+
+def at_least_zero(text: str) -> float:
+    """A finite number of at least 0."""
+    return _number(text, lambda x: x >= 0, "a number, at least 0")
+
+
+def above_zero(text: str) -> float:
+    """A finite number above 0."""
+    return _number(text, lambda x: x > 0, "a number above 0")
+
+
+def low_high(text: str) -> tuple[float, float]:
+    """Two numbers above 0 with a comma between them, the smaller one first."""
+    parts = text.split(",")
+    expected = "LOW,HIGH with 0 < LOW <= HIGH, such as 0.8,1.2"
+    low, high = (
+        _number(part, lambda x: x > 0, expected)
+        for part in (parts if len(parts) == 2 else ("", ""))
+    )
+    if low > high:
+        raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
+    return low, high
+
+
+def _number(text: str, fits: Callable[[float], bool], expected: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not (math.isfinite(number) and fits(number)):
+        raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
+    return number
+
+
+def output(*suffixes: str) -> Callable[[str], Path]:
+    """A file with one of the suffixes, in a folder that exists."""
+
+    def check(text: str) -> Path:
+        path = Path(text)
+        if path.suffix.lower() not in suffixes:
+            expected = " or ".join(suffixes)
+            raise argparse.ArgumentTypeError(
+                f"expected a file that ends in {expected}, got {text!r}"
+            )
+        if not path.parent.is_dir():
+            raise argparse.ArgumentTypeError(f"no folder {path.parent}; make it first")
+        return path
+
+    return check

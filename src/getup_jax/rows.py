@@ -1,0 +1,38 @@
+"""Work on the few rows of a batch that need it, instead of on all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+
+def replace_rows(
+    rows: Any, mask: jax.Array, compute: Callable[[jax.Array], Any], chunk: int
+) -> Any:
+    """The pytree rows [N, ...] with `compute` in the rows where mask [N].
+
+    `compute` gets row numbers [C] and gives new rows [C, ...]. It is called inside a loop that goes
+    through the masked rows C = min(chunk, N) at a time, so that its cost is that of the rows that
+    change. The last chunk is filled up with other rows, whose result is dropped.
+    """
+    total = mask.shape[0]
+    size = min(chunk, total)
+    order = jnp.argsort(~mask, stable=True)  # the masked rows first
+    order = jnp.concatenate([order, jnp.zeros(size, order.dtype)])
+    count = jnp.sum(mask)
+
+    def replace_chunk(carry: tuple[jax.Array, Any]) -> tuple[jax.Array, Any]:
+        first, rows = carry
+        index = jax.lax.dynamic_slice_in_dim(order, first, size)
+        masked = first + jnp.arange(size) < count
+        place = jnp.where(masked, index, total)  # past the end: dropped
+        rows = jax.tree.map(
+            lambda old, new: old.at[place].set(new, mode="drop"), rows, compute(index)
+        )
+        return first + size, rows
+
+    start = jnp.zeros((), count.dtype)
+    return jax.lax.while_loop(lambda carry: carry[0] < count, replace_chunk, (start, rows))[1]

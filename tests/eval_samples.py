@@ -1,0 +1,52 @@
+"""Episodes of the tiny task with an untrained policy, for the tests of evaluation."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import jax
+from tiny_task import CONFIG, tiny_task
+
+from getup_jax.algo.learner import Learner, make_learner
+from getup_jax.algo.state import PolicyState
+from getup_jax.checkpoint import CHECKPOINTS, save_learner
+from getup_jax.conditions import Conditions, make_plan
+from getup_jax.config import Config, NetworkConfig
+from getup_jax.episodes import Episodes, run_episodes
+from getup_jax.nets.prior import to_dict
+from getup_jax.physics.character import load_character
+from getup_jax.tasks.build import BuiltTask
+
+SMALL = dataclasses.replace(
+    CONFIG,
+    network=NetworkConfig(hidden_sizes=(8,)),
+    task=dataclasses.replace(CONFIG.task, stand_time_s=1.5, stand_start=1.0, clip_start=0.0),
+)
+
+
+def make_task(config: Config = SMALL) -> BuiltTask:
+    return tiny_task(load_character(config.physics), config)
+
+
+def make_policy(task: BuiltTask, config: Config = SMALL) -> tuple[Learner, PolicyState]:
+    learner = make_learner(
+        task.environment, config.network, config.ppo, total_steps=config.train.total_steps
+    )
+    return learner, learner.init_learner(jax.random.PRNGKey(0)).policy
+
+
+def run(task: BuiltTask, conditions: Conditions, number: int) -> Episodes:
+    learner, policy = make_policy(task)
+    _, styles, rows = task.world.pool.table.shape
+    plan = make_plan(conditions, number, styles, rows)
+    return run_episodes(task, learner, policy, plan, lambda _: None)
+
+
+def save_policy(folder: Path, task: BuiltTask, config: Config = SMALL, iteration: int = 3) -> Path:
+    """A run folder with one checkpoint of an untrained policy."""
+    _, policy = make_policy(task, config)
+    item = {"policy": policy, "prior": to_dict(task.prior)}
+    metadata = {"steps": 100 * iteration}
+    save_learner(folder / CHECKPOINTS, iteration, policy, config, item, metadata)
+    return folder

@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+from tiny_task import tiny_task
+
+from eval_samples import SMALL, make_task, save_policy
+from getup_jax import cli, evaluate, export
+from getup_jax.checkpoint import MAX_EXPORT_BYTES, load_policy
+from getup_jax.conditions import Conditions
+from getup_jax.export import CARD
+from getup_jax.metrics import MetricsWriter
+from getup_jax.physics.character import load_character
+from getup_jax.settings import load_config
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory):
+    """A run of an untrained policy, with metrics past its only checkpoint."""
+    folder = save_policy(tmp_path_factory.mktemp("runs") / "tiny", make_task())
+    with MetricsWriter(folder) as writer:
+        for iteration, wall_s in ((2, 50.0), (3, 3700.0), (4, 9999.0)):
+            writer.write(iteration, 100 * iteration, wall_s, {})
+    return folder
+
+
+def build(config, log, prior=None, choose=None):
+    """The tiny task in place of that of the library's motions."""
+    assert (config.task.clip_start, choose) == (0.0, None)
+    return tiny_task(load_character(config.physics), config)
+
+
+@pytest.fixture(scope="module")
+def results(run_folder):
+    """What `getup-eval` wrote about the run, and what it printed is in its log."""
+    file = run_folder / "out.json"
+    options = ["--episodes", "3", "--start-noise", "0.05", "--duration-scale", "0.8,1.2"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(evaluate, "build_task", build)
+        command = ["--ckpt", str(run_folder), *options, "--stand-time", "1", "--json", str(file)]
+        assert cli.eval_main(command) == 0
+    return file
+
+
+def test_eval_writes_scores_policy_and_conditions(results):
+    found = json.loads(results.read_text())
+    assert found["episodes"] == 3
+    assert set(found["per_curve"]) == {"clip", "curve"}
+    assert set(found["per_orientation"]) == {"supine"}
+    assert found["policy"]["steps"] == 300
+    conditions = found["conditions"]
+    assert (conditions["start_noise_rad"], conditions["duration_scale"]) == (0.05, [0.8, 1.2])
+    assert (conditions["stand_time_s"], conditions["engine"]) == (1.0, "native")
+    assert 0.0 <= found["saturation"] <= 1.0
+    assert found["offset_rad"] > 0
+    assert found["foot_slip_m_s"] > 0
+
+
+def test_the_config_of_an_evaluation_takes_its_starts_from_the_arguments():
+    config = load_config(None, ["task.start_noise_rad=0.3", "task.clip_start=0.3"])
+    args = cli.eval_parser().parse_args(["--episodes", "7", "--seed", "5"])
+    task = evaluate.evaluation_config(config, args).task
+    assert (task.start_noise_rad, task.clip_start, task.stand_start) == (0.0, 0.0, 0.0)
+    assert (task.pool_size, task.stand_time_s) == (7, config.task.stand_time_s)
+    args = cli.eval_parser().parse_args(["--start", "standing", "--start-noise", "0.1"])
+    task = evaluate.evaluation_config(config, args).task
+    assert (task.stand_start, task.start_noise_rad) == (1.0, 0.1)
+    assert Conditions.of(args).kind == 1
+
+
+def test_a_push_without_time_to_stand_is_refused_before_anything_is_built(run_folder, capsys):
+    assert cli.eval_main(["--ckpt", str(run_folder), "--push", "9", "--stand-time", "0.5"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith("ConfigError: --push: ")
+    assert captured.out == ""
+
+
+def test_without_a_shipped_policy_the_error_says_what_to_do(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert cli.eval_main(["--ckpt", "nothing"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("CheckpointError: nothing: no such folder; ")
+    assert "getup-train configs/flat.yaml" in error
+
+
+# Policies to ship.
+
+
+def test_an_export_is_a_small_policy_with_a_card(run_folder, results, tmp_path, capsys):
+    out = tmp_path / "assets" / "tiny"
+    command = [str(run_folder), str(out), "--eval", str(results), "--machine", "2 cores"]
+    assert export.main([*command, "--commit", "abc123"]) == 0
+    assert "look at" in capsys.readouterr().out
+    loaded = load_policy(out)
+    assert loaded.config == SMALL
+    assert loaded.prior is not None
+    assert not (out / "learner").exists()
+    assert sum(file.stat().st_size for file in out.rglob("*") if file.is_file()) < MAX_EXPORT_BYTES
+    card = (out / CARD).read_text()
+    for fact in ("| control steps | 300 |", "| wall time | 1 h 01 min |", "| commit | abc123 |"):
+        assert fact in card
+    assert "| machine | 2 cores |" in card
+    assert (
+        "Lying starts, seed 0, engine native, joint noise 0.05 rad, durations T x U(0.8, 1.2)"
+        in card
+    )
+    assert "| all | 0.0% (0.0% - 56.1%) |" in card
+    assert "Curves that succeed in less than 80%: clip (0%), curve (0%)." in card
+
+
+def test_an_export_can_be_made_again_and_says_what_is_unknown(run_folder, tmp_path):
+    for _ in range(2):
+        out = export.export(load_policy(run_folder).path, tmp_path / "tiny")
+    card = (out / CARD).read_text()
+    assert "| machine | unknown |" in card
+    assert "Not evaluated yet." in card
+
+
+def test_results_of_another_policy_are_refused(run_folder, results, tmp_path, capsys):
+    other = json.loads(results.read_text())
+    other["policy"]["steps"] = 1
+    file = tmp_path / "other.json"
+    file.write_text(json.dumps(other))
+    assert export.main([str(run_folder), str(tmp_path / "out"), "--eval", str(file)]) == 2
+    assert "evaluate what is exported" in capsys.readouterr().err
+    file.write_text("{}")
+    assert export.main([str(run_folder), str(tmp_path / "out"), "--eval", str(file)]) == 2
+    assert "expected a file of getup-eval --json" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
