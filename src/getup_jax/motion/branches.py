@@ -48,7 +48,7 @@ def nearer_branches(
         chosen = _choose(triple, twin, settings)
         moved = np.where(chosen[:, None], twin, triple)
         half = max(4, round(settings.half_s * fps))
-        for frame in np.flatnonzero(np.diff(chosen.astype(np.int8))) + 1:
+        for frame in (np.flatnonzero(np.diff(chosen.astype(np.int8))) + 1).tolist():
             start, stop = max(frame - half, 0), min(frame + half, len(moved) - 1)
             moved[start : stop + 1] = _path(moved, triple, (start, stop), turns, fps, settings)
         low, high = character.joint_lower[hinges], character.joint_upper[hinges]

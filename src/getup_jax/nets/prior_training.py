@@ -68,7 +68,7 @@ class Recipe:
         """AdamW with a rate that falls along half a cosine; Adam at a constant one by default."""
         return optax.adamw(self.rate, weight_decay=self.weight_decay)
 
-    def rate(self, count: jax.Array) -> jax.Array:
+    def rate(self, count: Any) -> jax.Array:
         """Learning rate [] of update number `count`."""
         fallen = 0.5 - 0.5 * jnp.cos(jnp.pi * count / self.updates)
         return self.learning_rate * (1.0 - (1.0 - self.last_rate) * fallen)
