@@ -70,6 +70,9 @@ class PriorConfig:
     hidden_sizes: tuple[int, ...] = (256, 256)
     beta: float = 1e-6  # weight of the KL term
     learning_rate: float = 1e-4
+    last_rate: float = 1.0  # share of it at the end, reached along a half cosine; 1: constant
+    weight_decay: float = 0.0  # AdamW's, decoupled from the gradient; 0: Adam
+    input_noise: float = 0.0  # on the encoder's input, in standard deviations of each hinge
     epochs: int = 100
     batch_size: int = 128
     min_updates: int = 20_000  # small pose sets get more epochs, until this many updates
@@ -78,6 +81,9 @@ class PriorConfig:
 
     def __post_init__(self) -> None:
         _require(0 < self.holdout < 1, "prior.holdout", "between 0 and 1", self.holdout)
+        _require(0 <= self.last_rate <= 1, "prior.last_rate", "between 0 and 1", self.last_rate)
+        for name in ("weight_decay", "input_noise"):
+            _require(getattr(self, name) >= 0, f"prior.{name}", "at least 0", getattr(self, name))
         for name in ("latent_size", "learning_rate", "epochs", "batch_size"):
             _require(getattr(self, name) > 0, f"prior.{name}", "more than 0", getattr(self, name))
 

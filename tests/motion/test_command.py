@@ -39,6 +39,10 @@ def test_import_list_events_and_plot(rise, tmp_path, capsys):
     assert "supine" in capsys.readouterr().out
     assert main(["plot", str(clips), "--out", str(tmp_path / "curves.png")]) == 0
     assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
+    classes = tmp_path / "strategies.png"
+    assert main(["plot", str(clips), "--strategies", "--out", str(classes)]) == 0
+    assert classes.read_bytes().startswith(b"\x89PNG")
+    assert classes.read_bytes() != (tmp_path / "curves.png").read_bytes()
 
 
 def test_a_bad_file_is_reported_and_the_others_go_on(rise, tmp_path, capsys):
@@ -52,13 +56,35 @@ def test_a_bad_file_is_reported_and_the_others_go_on(rise, tmp_path, capsys):
     assert "error: bad.bvh" in capsys.readouterr().out
 
 
-def test_a_short_file_needs_a_flag(rise, tmp_path, capsys):
-    file = rise / "rise.bvh"
+def test_a_file_that_lacks_one_row_is_used_and_reported(rise, tmp_path, capsys):
+    file, report = rise / "rise.bvh", tmp_path / "report.json"
     file.write_text(file.read_text().replace("Frames: 48", "Frames: 49"))
+    assert main(["import", str(file), "--json", str(report)]) == 0
+    assert "warning: rise.bvh: header says 49 frames" in capsys.readouterr().out
+    (entry,) = json.loads(report.read_text())
+    assert entry["warnings"] == ["header says 49 frames, file has 48 rows; 48 frames are used"]
+    assert entry["errors"] == []
+    assert entry["frames"] == 48
+    assert len(entry["events"]) == 1
+
+
+def test_a_file_that_lacks_more_rows_needs_a_flag(rise, capsys):
+    file = rise / "rise.bvh"
+    file.write_text(file.read_text().replace("Frames: 48", "Frames: 50"))
     assert main(["import", str(file)]) == 1
-    assert "header says 49 frames, file has 48 rows" in capsys.readouterr().out
+    assert "header says 50 frames, file has 48 rows" in capsys.readouterr().out
     assert main(["import", str(file), "--allow-short"]) == 0
     assert "warning" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["import", "events", "list", "plot"])
+def test_every_command_explains_itself(command, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([command, "--help"])
+    assert stop.value.code == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "exit code: 0" in text
+    assert "authored, deepmimic, a folder or a file" in text or command in ("import", "events")
 
 
 def test_a_clip_that_never_lies_is_warned_about(tmp_path, character, cache, capsys):

@@ -76,7 +76,7 @@ def test_an_unknown_source(character, tmp_path):
 
 def test_deepmimic_without_pybullet_says_what_to_install(character, monkeypatch):
     monkeypatch.setattr(library.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(MotionError, match="pip install pybullet"):
+    with pytest.raises(MotionError, match=r"pip install 'getup-jax\[deepmimic\]'"):
         load(character, "deepmimic")
 
 

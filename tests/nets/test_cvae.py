@@ -60,6 +60,20 @@ def test_noise_moves_the_latent_by_its_standard_deviation():
     np.testing.assert_allclose(decoded, expected, atol=1e-6)
 
 
+def test_blur_reaches_the_encoder_and_not_what_is_to_be_decoded():
+    model, variables = make()
+    angles, condition = arrays()
+    blur, noise = jnp.full_like(angles, 0.1), jnp.zeros((ROWS, LATENT))
+    terms = loss_terms(model, variables, (angles, condition), noise, 1.0, blur)
+    decoded, mean, log_variance = model.apply(variables, angles + blur, condition, noise)
+    np.testing.assert_allclose(
+        terms["reconstruction"], jnp.mean((decoded - angles) ** 2), rtol=1e-5
+    )
+    np.testing.assert_allclose(
+        terms["kl"], jnp.sum(kl_to_standard_normal(mean, log_variance)), rtol=1e-5
+    )
+
+
 def test_reconstruction_is_averaged_in_squared_radians():
     model, variables = make()
     angles, condition = arrays()

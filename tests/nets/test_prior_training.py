@@ -5,15 +5,19 @@ import numpy as np
 import pytest
 from pose_samples import QUICK, character, manifold_poses, pose_set, quick_prior
 
+from getup_jax.config import MotionConfig, PriorConfig
+from getup_jax.motion.library import load_motions
 from getup_jax.nets import prior as pose_prior
 from getup_jax.nets import prior_cache, prior_report
 from getup_jax.nets.prior_data import BLOCK, PoseSet, blocks, make_pose_set, pose_conditions, split
 from getup_jax.nets.prior_training import (
     PROGRESS_CALLS,
+    Recipe,
     limit_check,
     pca_variance,
     train_prior,
 )
+from getup_jax.paths import asset_path
 
 BRIEF = dataclasses.replace(QUICK, min_updates=30)
 
@@ -117,6 +121,35 @@ def test_the_same_arguments_give_the_same_prior():
     np.testing.assert_array_equal(one.latent_mean, two.latent_mean)
 
 
+def recipe(**values):
+    arrays = {"learning_rate": 1e-3, "last_rate": 1.0, "weight_decay": 0.0, "input_noise": 0.0}
+    arrays |= {"updates": 100.0, "beta": 0.0, **values}
+    return Recipe(None, 8, **{name: jnp.float32(value) for name, value in arrays.items()})
+
+
+def test_the_rate_falls_along_half_a_cosine_and_is_constant_by_default():
+    falling = recipe(last_rate=0.1)
+    rates = [float(falling.rate(jnp.asarray(count))) for count in (0, 50, 100)]
+    np.testing.assert_allclose(rates, [1e-3, 0.55e-3, 1e-4], rtol=1e-5)
+    assert float(recipe().rate(jnp.asarray(70))) == pytest.approx(1e-3, rel=1e-7)
+
+
+def test_weight_decay_shrinks_parameters_without_a_gradient_and_is_off_by_default():
+    params = {"kernel": jnp.full(3, 2.0)}
+    for decay, expected in ((0.0, 2.0), (0.5, 2.0 * (1 - 1e-3 * 0.5))):
+        optimiser = recipe(weight_decay=decay).optimiser
+        change, _ = optimiser.update({"kernel": jnp.zeros(3)}, optimiser.init(params), params)
+        np.testing.assert_allclose(params["kernel"] + change["kernel"], expected, rtol=1e-6)
+
+
+def test_every_setting_of_the_recipe_changes_the_prior():
+    plain = train_prior(small_set(), BRIEF)[0].latent_mean
+    for change in ({"last_rate": 0.0}, {"weight_decay": 0.1}, {"input_noise": 0.1}):
+        other = train_prior(small_set(), dataclasses.replace(BRIEF, **change))[0]
+        assert np.isfinite(other.latent_mean).all()
+        assert not np.array_equal(other.latent_mean, plain), change
+
+
 def test_pca_variance_of_a_plane_and_of_a_ball():
     rng = np.random.default_rng(0)
     plane = rng.normal(size=(500, 2)) @ rng.normal(size=(2, 10))
@@ -181,6 +214,21 @@ def test_other_poses_or_settings_are_another_prior():
     }
     assert len(prints) == 4
     assert prior_cache.fingerprint(small_set(), BRIEF) in prints
+
+
+@pytest.mark.parametrize("name", ["last_rate", "weight_decay", "input_noise"])
+def test_settings_that_came_later_name_another_prior_once_they_are_used(name):
+    used = dataclasses.replace(BRIEF, **{name: 0.25})
+    poses = small_set()
+    assert prior_cache.fingerprint(poses, used) != prior_cache.fingerprint(poses, BRIEF)
+
+
+def test_the_shipped_prior_belongs_to_the_shipped_motions_and_the_default_settings():
+    poses = load_motions(MotionConfig(), character()).poses
+    name = prior_cache.fingerprint(make_pose_set(poses, character(), mirrored=True), PriorConfig())
+    prior, report = prior_cache.load_prior(asset_path("priors", f"prior-{name}.npz"))
+    assert prior.num_joints == character().num_joints
+    assert report.heldout_rmse_deg < 5.0
 
 
 # --- what the prior does to bodies

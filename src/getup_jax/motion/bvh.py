@@ -17,6 +17,7 @@ from getup_jax.motion.clips import MotionError
 from getup_jax.motion.skeleton import Recording, scaled, turned
 
 Y_UP = Rotation.from_euler("x", 90, degrees=True)  # file axes (Y up) to ours (Z up)
+OFF_BY_ONE = 1  # rows that a writer may forget: a file that lacks more has lost a part
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,7 +26,7 @@ class BvhOptions:
 
     metres: float | None = None  # size of the file's unit; None: from the leg length
     up: str = "y"  # y | z, the file's vertical axis
-    allow_short: bool = False  # take files with another row count than the header says
+    allow_short: bool = False  # take files that lack many rows, or have more than the header says
 
 
 def read_bvh(path: str | Path, options: BvhOptions = BvhOptions()) -> Recording:
@@ -57,7 +58,8 @@ def _rows(
     warnings = []
     if len(found) != header.frames:
         counts = f"header says {header.frames} frames, file has {len(found)} rows"
-        if not allow_short or not found:
+        tolerated = allow_short or header.frames - len(found) == OFF_BY_ONE
+        if not tolerated or not found:
             hint = "fix the header" + (" or pass --allow-short" if found else "")
             raise MotionError(f"{path.name}: {counts}; {hint}")
         warnings.append(f"{counts}; {min(len(found), header.frames)} frames are used")

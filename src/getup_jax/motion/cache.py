@@ -26,8 +26,8 @@ from getup_jax.physics.character import CharacterSpec
 
 # Code whose change makes other clips out of the same files.
 _CODE = (
-    *("asf_amc", "axes", "body", "bvh", "bvh_header", "calibrate", "composite_json", "deepmimic"),
-    *("jacobian", "names", "readers", "retarget", "skeleton", "solver", "targets"),
+    *("asf_amc", "axes", "body", "branches", "bvh", "bvh_header", "calibrate", "composite_json"),
+    *("deepmimic", "jacobian", "names", "readers", "retarget", "skeleton", "solver", "targets"),
 )
 _SHAPE = (
     *("body_parentid", "body_pos", "body_quat", "geom_bodyid", "geom_type", "geom_size"),

@@ -7,6 +7,7 @@ import dataclasses
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -35,7 +36,11 @@ examples:
   getup-motion events clips/fall.npz       when it lies, rises and stands
   getup-motion list authored clips/        get-ups that a config can train on
   getup-motion plot clips/ --out curves.png
+  getup-motion plot authored --strategies --out strategies.png
 """
+
+_EXIT = "exit code: 0 where every file was used, with warnings or without; 1 where one was not"
+_SOURCE = "authored, deepmimic, a folder or a file"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -52,26 +57,32 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    load = commands.add_parser("import", help="read and retarget motion files")
+    load = _command(commands, "import", _import, "read and retarget motion files")
     load.add_argument("paths", nargs="+", type=Path, metavar="FILE|FOLDER")
     load.add_argument("--out", type=Path, help="folder for the clips (.npz); none: only a check")
     load.add_argument("--json", type=Path, help="write the report as JSON")
     _add_reading(load)
-    load.set_defaults(run=_import)
-    show = commands.add_parser("list", help="the get-ups of motion sources")
-    show.add_argument("sources", nargs="*", default=["authored"], metavar="SOURCE")
-    show.set_defaults(run=_list)
-    plot = commands.add_parser("plot", help="draw the style curves of motion sources")
-    plot.add_argument("sources", nargs="+", metavar="SOURCE")
-    plot.add_argument("--out", type=Path, required=True, metavar="PNG")
-    plot.add_argument("--curves", nargs="*", default=[], help="only these get-ups")
-    plot.set_defaults(run=_plot)
-    events = commands.add_parser("events", help="the get-ups in one file")
+    show = _command(commands, "list", _list, "the get-ups of motion sources")
+    show.add_argument("sources", nargs="*", default=["authored"], metavar="SOURCE", help=_SOURCE)
+    plot = _command(commands, "plot", _plot, "draw the style curves of motion sources")
+    plot.add_argument("sources", nargs="+", metavar="SOURCE", help=_SOURCE)
+    plot.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture")
+    plot.add_argument("--curves", nargs="*", default=[], metavar="NAME", help="only these get-ups")
+    plot.add_argument(
+        "--strategies", action="store_true", help="only mean and deviation of each strategy"
+    )
+    events = _command(commands, "events", _events, "the get-ups in one file")
     events.add_argument("paths", nargs=1, type=Path, metavar="FILE")
     _add_reading(events)
-    events.set_defaults(run=_events)
-    for command in (load, show, plot, events):
-        command.add_argument("--character", default="humanoid49", help="name or MJCF file")
+    return parser
+
+
+def _command(commands: Any, name: str, run: Callable[..., int], text: str) -> Any:
+    """The parser of a sub-command; `text` is its line in the list and its description."""
+    parser = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+    parser.epilog = _EXIT
+    parser.add_argument("--character", default="humanoid49", help="name or MJCF file")
+    parser.set_defaults(run=run)
     return parser
 
 
@@ -79,7 +90,8 @@ def _add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--allow-short",
         action="store_true",
-        help="take BVH files with another number of rows than the header says",
+        help="take BVH files with another number of rows than the header says; "
+        "one row too few is only a warning, with the flag or without",
     )
     parser.add_argument("--names", type=Path, help="YAML or JSON map {joint: link}")
     parser.add_argument("--scale", type=float, help="metres in a unit of the file")
@@ -130,11 +142,14 @@ def _list(args: argparse.Namespace, character: CharacterSpec) -> int:
 
 
 def _plot(args: argparse.Namespace, character: CharacterSpec) -> int:
-    from getup_jax.motion.plot import plot_getups
+    from getup_jax.motion.plot import plot_getups, plot_strategies
 
     config = MotionConfig(source=tuple(args.sources), curves=tuple(args.curves))
     library = load_motions(config, character)
-    plot_getups(library.getups, character, args.out)
+    if args.strategies:
+        plot_strategies(library.getups, character, args.out)
+    else:
+        plot_getups(library.getups, character, args.out)
     Console().print(f"{args.out}: {len(library.getups)} get-ups")
     return 0
 

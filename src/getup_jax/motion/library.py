@@ -65,8 +65,9 @@ def deepmimic_folder() -> Path:
     spec = importlib.util.find_spec("pybullet_data")
     if spec is None or spec.origin is None:
         raise MotionError(
-            "motion.source: deepmimic: its motions come with pybullet; pip install pybullet, "
-            "or give the folder that holds humanoid3d_getup_*.txt"
+            "motion.source: deepmimic: expected the motions that come with pybullet, found none; "
+            "pip install 'getup-jax[deepmimic]' (or pybullet), or name the folder that holds "
+            "humanoid3d_getup_*.txt"
         )
     return Path(spec.origin).parent / "data" / "motions"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +15,7 @@ from getup_jax.motion import curves
 from getup_jax.motion.clips import GetUp, MotionError
 from getup_jax.motion.events import link_positions
 from getup_jax.motion.getups import clip_features
+from getup_jax.motion.strategies import classify
 from getup_jax.physics.character import CharacterSpec
 
 _LABELS = ("neck height (m)", "side to up (deg)", "front to up (deg)")
@@ -41,6 +44,47 @@ def plot_getups(getups: Sequence[GetUp], character: CharacterSpec, file: Path) -
     pyplot.close(figure)
 
 
+def plot_strategies(getups: Sequence[GetUp], character: CharacterSpec, file: Path) -> None:
+    """Write one PNG as [P figure 8]: a row a strategy, mean and deviation over the phase.
+
+    The classes are those of `classify`. Get-ups without a motion are left out, and those that
+    turn to the left are drawn as their mirror images, so that both sides have one mean.
+    """
+    classes = strategy_curves(getups, character)
+    if not classes:
+        raise MotionError("plot --strategies: no get-ups with a motion; leave the flag out")
+    pyplot = _pyplot()
+    size = (11, 2.1 * len(classes) + 0.4)
+    figure, axes = pyplot.subplots(len(classes), 3, figsize=size, squeeze=False, sharex=True)
+    for row, (name, values) in zip(axes, classes.items(), strict=True):
+        _draw_class(row, name, values)
+        for column, axis in enumerate(row):
+            axis.plot(_PHASE, values[..., column].T, "k", linewidth=0.6, alpha=0.35)
+    for axis, label in zip(axes[0], _LABELS, strict=True):
+        axis.set_title(label)
+    for axis in axes[-1]:
+        axis.set_xlabel("phase t / T")
+    figure.tight_layout()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(file, dpi=80)
+    pyplot.close(figure)
+
+
+def strategy_curves(getups: Sequence[GetUp], character: CharacterSpec) -> dict[str, np.ndarray]:
+    """{strategy: curves [n, 101, 3]} of the get-ups with a motion, all turning to the right."""
+    named = []
+    for getup in getups:
+        if getup.clip is not None:
+            positions = link_positions(getup.clip, character)
+            name = classify(positions, getup.clip.fps, character)
+            named.append(dataclasses.replace(getup, strategy=name))
+    classes = class_curves(named) if named else {}
+    for values in classes.values():
+        left = values[..., 1].mean(axis=1) < 90.0
+        values[left, :, 1] = 180.0 - values[left, :, 1]
+    return classes
+
+
 def class_curves(getups: Sequence[GetUp]) -> dict[str, np.ndarray]:
     """{strategy: curves [n, 101, 3] over the phase}, in the plot's units."""
     points = jnp.asarray(np.stack([getup.points for getup in getups]))
@@ -60,7 +104,7 @@ def _draw_class(row: Any, name: str, values: np.ndarray) -> None:
         axis.fill_between(_PHASE, low, high, alpha=0.3)
         axis.plot(_PHASE, mean[:, column])
         _finish(axis, column)
-    row[0].set_ylabel(f"{name}\n(n = {len(values)})", fontsize=7)
+    row[0].set_ylabel("\n".join(textwrap.wrap(name, 18)) + f"\n(n = {len(values)})", fontsize=8)
 
 
 def _draw_fit(row: Any, getup: GetUp, character: CharacterSpec) -> None:

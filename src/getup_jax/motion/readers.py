@@ -18,7 +18,7 @@ class ReadOptions:
     """What files do not say about themselves."""
 
     up: str = "y"  # y | z: the vertical axis of BVH files
-    allow_short: bool = False  # take BVH files with another row count than the header says
+    allow_short: bool = False  # take BVH files that lack more than one row, or have too many
 
 
 def read_motion(path: str | Path, options: ReadOptions = ReadOptions()) -> Recording:

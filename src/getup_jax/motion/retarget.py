@@ -1,7 +1,8 @@
 """A recording on a character: the one function that turns mocap into a Clip.
 
 Unit, rate and rest pose are sorted out first, then `targets` says where each link should be
-and `solver` finds the joint angles. What is left of the floor's penetration is lifted away.
+and `solver` finds the joint angles; `branches` takes the arms' angles that are nearer to rest.
+What is left of the floor's penetration is lifted away.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from getup_jax.motion.body import Body, body_of, hull_heights
+from getup_jax.motion.branches import BranchSettings, nearer_branches
 from getup_jax.motion.clips import Clip, MotionError
 from getup_jax.motion.names import map_names, require_links, unknown_joints
 from getup_jax.motion.skeleton import (
@@ -44,6 +46,7 @@ class RetargetSettings:
     floor: float | None = None  # m, height of the recording's floor; None: where it stands
     names: Mapping[str, str | None] | None = None  # {joint: link}, overrides the built-in names
     solver: SolverSettings = dataclasses.field(default_factory=SolverSettings)
+    branches: BranchSettings = dataclasses.field(default_factory=BranchSettings)
     penetration_m: float = 0.005  # what may stay below the floor
     lift_s: float = 0.2  # time over which the lift out of the floor is smoothed
 
@@ -79,6 +82,7 @@ def retarget(
     body = body_of(character)
     targets = make_targets(recording, links, body, settings.floor)
     qpos = solve_clip(body, targets, settings.solver)
+    qpos = nearer_branches(qpos, character, settings.fps, settings.branches)
     qpos[:, 2] += lift(_hull_minimum(qpos, body), settings)
     clip = Clip(recording.name, settings.fps, qpos, recording.source)
     unknown = tuple(unknown_joints(names, links))

@@ -121,6 +121,7 @@ def loss_terms(
     batch: tuple[jax.Array, jax.Array],
     noise: jax.Array,
     beta: jax.Array | float,
+    blur: jax.Array | float = 0.0,
 ) -> dict[str, jax.Array]:
     """The terms of the loss [] of a batch (angles [N, J], condition [N, 3]); it is their sum.
 
@@ -129,10 +130,11 @@ def loss_terms(
     reduction of the published ancestor (Yin et al. 2021), so beta goes with the batch size: per
     pose, the KL weighs N * beta against the mean squared error.
 
-    noise [N, Z] is standard normal.
+    noise [N, Z] is standard normal. blur [N, J] (rad) is added to what the encoder sees, and not
+    to what is to be decoded.
     """
     angles, condition = batch
-    output: Any = model.apply(variables, angles, condition, noise)
+    output: Any = model.apply(variables, angles + blur, condition, noise)
     decoded, mean, log_variance = output
     return {
         "reconstruction": jnp.mean(jnp.square(decoded - angles)),

@@ -22,6 +22,9 @@ from getup_jax.nets.prior_training import PriorReport, train_prior
 # Raise it whenever the same poses and settings would give another prior, or the files change.
 FORMAT = 1
 
+# Settings that came later: at their defaults they leave the name of an older prior as it was.
+_LATER = ("last_rate", "weight_decay", "input_noise")
+
 _DECIMALS = 3  # of the statistics (rad, m) that tell one set of poses from another
 
 Log = Callable[[str], None]
@@ -61,7 +64,7 @@ def fingerprint(poses: PoseSet, config: PriorConfig) -> str:
     The statistics are rounded, since the last bits of a pose differ between processors, and a prior
     that is shipped must be found on all of them.
     """
-    settings = [FORMAT, dataclasses.asdict(config), poses.angles.shape]
+    settings = [FORMAT, _settings(config), poses.angles.shape]
     digest = hashlib.sha256(json.dumps(settings).encode())
     for field in dataclasses.fields(poses):
         array = np.asarray(getattr(poses, field.name))
@@ -71,6 +74,14 @@ def fingerprint(poses: PoseSet, config: PriorConfig) -> str:
             array = np.round(moments, _DECIMALS) + 0.0  # adding 0 turns -0 into 0
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:16]
+
+
+def _settings(config: PriorConfig) -> dict[str, Any]:
+    """All settings but later ones at their defaults."""
+    default = PriorConfig()
+    values = dataclasses.asdict(config)
+    old = [name for name in _LATER if values[name] == getattr(default, name)]
+    return {name: value for name, value in values.items() if name not in old}
 
 
 def save_prior(path: Path, prior: PosePrior, report: PriorReport) -> None:
