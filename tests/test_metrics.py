@@ -11,7 +11,7 @@ from rich.console import Console
 
 from getup_jax.config import ConfigError
 from getup_jax.journal import Journal, means
-from getup_jax.metrics import FILE, MetricsWriter, read_metrics
+from getup_jax.metrics import FILE, TIMES, MetricsWriter, read_metrics
 from getup_jax.progress import Display, count, describe, duration
 
 
@@ -26,8 +26,10 @@ def test_a_line_is_written_when_write_returns(tmp_path):
     writer.write(1, 3_000_000_000, 0.12345, {"rollout/reward": 0.5, "loss/value": math.nan})
     line = (tmp_path / "run" / FILE).read_text()
     assert line.count("\n") == 1
-    expected = {"iteration": 1, "steps": 3_000_000_000, "wall_s": 0.123}
+    expected = {"iteration": 1, "steps": 3_000_000_000}
     assert json.loads(line) == {**expected, "rollout/reward": 0.5, "loss/value": None}
+    time = (tmp_path / "run" / TIMES).read_text()
+    assert json.loads(time) == {"iteration": 1, "wall_s": 0.123}
     writer.close()
 
 
@@ -48,7 +50,8 @@ def test_resuming_drops_the_lines_past_the_checkpoint(tmp_path):
     rows = read_metrics(tmp_path / FILE)
     assert [row["iteration"] for row in rows] == [1, 2, 3]
     assert "again" in rows[2]
-    assert [path.name for path in tmp_path.iterdir()] == [FILE]
+    assert [row["wall_s"] for row in rows] == [0.5, 1.0, 1.5]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [FILE, TIMES]
 
 
 def test_starting_anew_drops_all_lines(tmp_path):
@@ -130,6 +133,7 @@ def test_a_journal_writes_means_and_speed(tmp_path):
     (row,) = read_metrics(tmp_path)
     assert (row["iteration"], row["steps"], row["rollout/reward"]) == (6, 60, 2.0)
     assert row["steps_per_s"] > 0
+    assert "steps_per_s" not in (tmp_path / FILE).read_text()
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def _evaluation(file: Path, loaded: LoadedPolicy) -> Mapping[str, Any]:
 
 
 def _wall_s(loaded: LoadedPolicy) -> float | None:
-    """Wall time (s) of the run until the checkpoint RUN/checkpoints/N, from RUN/metrics.jsonl."""
+    """Wall time (s) of the run until the checkpoint RUN/checkpoints/N, from the run's times."""
     run, last = loaded.path.parent.parent, loaded.metadata["iteration"]
     if not (run / FILE).is_file():
         return None

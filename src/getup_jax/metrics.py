@@ -1,7 +1,8 @@
 """metrics.jsonl: one JSON object a line, the one consistent history of a run.
 
-Every line has `iteration`, `steps` and `wall_s` beside the metrics; NaN is null. TensorBoard
-gets the same numbers where it is asked for.
+Every line has `iteration` and `steps` beside the metrics; NaN is null. What a clock says, `wall_s`
+and `steps_per_s`, goes into times.jsonl, so that the same seed on the same machine gives the same
+metrics.jsonl, bit for bit. TensorBoard gets the same numbers where it is asked for.
 """
 
 from __future__ import annotations
@@ -12,16 +13,18 @@ import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from getup_jax.config import ConfigError
 
 FILE = "metrics.jsonl"
+TIMES = "times.jsonl"
 _OWN = ("iteration", "steps", "wall_s")
+_CLOCK = "steps_per_s"  # a metric that belongs to the times
 
 
 class MetricsWriter:
-    """Appends lines to FOLDER/metrics.jsonl, each flushed when it is written.
+    """Appends lines to FOLDER/metrics.jsonl and times.jsonl, each flushed when it is written.
 
     Lines past `resume_iteration` are dropped first, and all of them where that is 0, so that
     a resumed run writes each iteration once.
@@ -29,30 +32,33 @@ class MetricsWriter:
 
     def __init__(self, folder: Path, resume_iteration: int = 0, tensorboard: bool = False) -> None:
         folder.mkdir(parents=True, exist_ok=True)
-        self._path = folder / FILE
-        kept = [row for row in _rows(self._path) if row["iteration"] <= resume_iteration]
-        _rewrite(self._path, kept)
-        self.wall_s: float = kept[-1]["wall_s"] if kept else 0.0  # s, of the last line
+        kept = _keep(folder / FILE, resume_iteration)
+        times = _keep(folder / TIMES, resume_iteration)
+        self.wall_s: float = times[-1]["wall_s"] if times else 0.0  # s, of the last line
         self._board = None
         if tensorboard:
             # What an earlier run wrote past the last kept line is hidden.
             purge = kept[-1]["steps"] + 1 if kept else 0
             writer = tensorboard_module().SummaryWriter
             self._board = writer(str(folder / "tensorboard"), purge_step=purge)
-        self._file = self._path.open("a", encoding="utf-8")
+        self._file = (folder / FILE).open("a", encoding="utf-8")
+        self._times = (folder / TIMES).open("a", encoding="utf-8")
 
     def write(
         self, iteration: int, steps: int, wall_s: float, metrics: Mapping[str, float]
     ) -> None:
-        """Add one line; `wall_s` counts from the start of the whole run."""
+        """Add one line to either file; `wall_s` counts from the start of the whole run."""
         taken = [name for name in _OWN if name in metrics]
         if taken:
             raise ValueError(f"metrics: the names {taken} are the line's own; rename them")
         values = {name: _finite(value) for name, value in metrics.items()}
-        row = {"iteration": iteration, "steps": steps, "wall_s": round(wall_s, 3), **values}
-        self._file.write(json.dumps(row, allow_nan=False) + "\n")
-        self._file.flush()
-        self.wall_s = row["wall_s"]
+        time = {"iteration": iteration, "wall_s": round(wall_s, 3)}
+        time |= {name: values[name] for name in values if name == _CLOCK}
+        row = {"iteration": iteration, "steps": steps}
+        row |= {name: values[name] for name in values if name != _CLOCK}
+        _append(self._times, time)
+        _append(self._file, row)
+        self.wall_s = time["wall_s"]
         if self._board is not None:
             for name, value in values.items():
                 if value is not None:
@@ -61,6 +67,7 @@ class MetricsWriter:
     def close(self) -> None:
         """Close the files."""
         self._file.close()
+        self._times.close()
         if self._board is not None:
             self._board.close()
 
@@ -72,14 +79,28 @@ class MetricsWriter:
 
 
 def read_metrics(path: str | Path) -> list[dict[str, Any]]:
-    """The lines of a run folder's metrics.jsonl (or of that file), nulls as NaN.
+    """The lines of a run folder's metrics.jsonl (or of that file) with their times, nulls as NaN.
 
     Raises FileNotFoundError; a last line that a killed run left unfinished is skipped.
     """
     path = Path(path) / FILE if Path(path).is_dir() else Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path}: no such file; expected a run folder or its {FILE}")
-    return [{k: math.nan if v is None else v for k, v in row.items()} for row in _rows(path)]
+    times = {row["iteration"]: row for row in _rows(path.with_name(TIMES))}
+    rows = [row | times.get(row["iteration"], {}) for row in _rows(path)]
+    return [{k: math.nan if v is None else v for k, v in row.items()} for row in rows]
+
+
+def _append(file: TextIO, row: Mapping[str, Any]) -> None:
+    file.write(json.dumps(row, allow_nan=False) + "\n")
+    file.flush()
+
+
+def _keep(path: Path, last: int) -> list[dict[str, Any]]:
+    """Drop the file's lines past an iteration; returns the others."""
+    kept = [row for row in _rows(path) if row["iteration"] <= last]
+    _rewrite(path, kept)
+    return kept
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:
