@@ -24,8 +24,8 @@ examples:
   getup-train flat ppo.num_envs=256 seed=1 --run runs/seed1
                                                        change settings, keep the file
 
-A run folder holds config.yaml (every setting), metrics.jsonl and times.jsonl (one line an iteration) and
-checkpoints/. Ctrl-C and SIGTERM save and exit; a second Ctrl-C exits at once.
+A run folder holds config.yaml (every setting), metrics.jsonl and times.jsonl (one line an
+iteration) and checkpoints/. Ctrl-C and SIGTERM save and exit; a second Ctrl-C exits at once.
 """
 
 

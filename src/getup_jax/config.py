@@ -104,6 +104,7 @@ class TaskConfig:
     stand_start: float = 0.3  # share of episodes that start standing
     clip_start: float = 0.0  # share that starts along the reference clip, or one that fits
     curve_match_rad: float = 0.52  # largest gap between a curve's and a pose's torso angles
+    focus: float = 0.0  # 0: starts are drawn evenly; towards 1: the more, the more often they fail
     start_noise_rad: float = 0.0  # joint noise of the start poses
     pool_size: int = 2048  # start states made once
     settle_s: float = 0.5  # lying starts rest this long before the pool keeps them
@@ -111,6 +112,7 @@ class TaskConfig:
     def __post_init__(self) -> None:
         share = self.stand_start + self.clip_start
         _require(0 <= share <= 1, "task.stand_start + task.clip_start", "between 0 and 1", share)
+        _require(0 <= self.focus < 1, "task.focus", "at least 0 and less than 1", self.focus)
         _require(0 < self.filter <= 1, "task.filter", "more than 0 and at most 1", self.filter)
         now = self.lookahead_s[:1] == (0.0,)
         _require(now, "task.lookahead_s", "times that start with 0, the present", self.lookahead_s)

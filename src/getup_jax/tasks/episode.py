@@ -50,6 +50,7 @@ class EpisodeState:
     head_steps: jax.Array  # [B] int32, steps in a row with the head on the floor
     record: Record
     key: jax.Array
+    focus: jax.Array | None = None  # [3, G, bins] success of the batch's starts; see focus.py
 
 
 def update_record(

@@ -16,8 +16,8 @@ from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain import Terrain
 from getup_jax.rotation import angle, conjugate, multiply, rotate
 from getup_jax.rows import replace_rows
-from getup_jax.tasks import rewards
-from getup_jax.tasks.episode import EpisodeState, Record, update_record, verdict
+from getup_jax.tasks import focus, rewards
+from getup_jax.tasks.episode import EpisodeState, Record, stands, update_record, verdict
 from getup_jax.tasks.observation import Observer, Posture
 from getup_jax.tasks.reset_pool import Pool
 from getup_jax.types import Engine, StepOutput, take
@@ -67,7 +67,9 @@ class GetUpTask:
     def init(self, world: World, key: jax.Array, num_envs: int) -> EpisodeState:
         """B fresh episodes."""
         key_start, key_state = jax.random.split(key)
-        return self.start_random(world, key_start, num_envs).replace(key=key_state)
+        learned = focus.first(world.pool) if self.config.focus > 0 else None
+        state = self.start_random(world, key_start, num_envs, learned)
+        return state.replace(key=key_state, focus=learned)
 
     def step(
         self, world: World, state: EpisodeState, action: jax.Array
@@ -75,23 +77,26 @@ class GetUpTask:
         """One control step; episodes that end start anew."""
         after, output = self.advance(world, state, action)
         key_next, key_reset = jax.random.split(state.key)
-        getup, kind, row = self._draw(world, key_reset, action.shape[0])
+        learned = self._learned(world, after, output)
+        getup, kind, row = self._draw(world, key_reset, action.shape[0], learned)
 
         def fresh(index: jax.Array) -> EpisodeState:
             return self.start(world, getup[index], kind[index], row[index]).replace(key=None)
 
         done = output.terminated | output.truncated
-        # the key has no simulation axis, so it stays out of the rows
-        after = replace_rows(after.replace(key=None), done, fresh, _RESET_CHUNK)
-        after = after.replace(key=key_next)
+        # the key and the focus have no simulation axis, so they stay out of the rows
+        after = replace_rows(after.replace(key=None, focus=None), done, fresh, _RESET_CHUNK)
+        after = after.replace(key=key_next, focus=learned)
         return after, output.replace(observation=after.observation)
 
-    def start_random(self, world: World, key: jax.Array, num_envs: int) -> EpisodeState:
-        """Episodes with a random style and kind of start."""
-        return self.start(world, *self._draw(world, key, num_envs))
+    def start_random(
+        self, world: World, key: jax.Array, num_envs: int, learned: jax.Array | None = None
+    ) -> EpisodeState:
+        """Episodes with a random style and kind of start; `learned` is the state's focus."""
+        return self.start(world, *self._draw(world, key, num_envs, learned))
 
     def _draw(
-        self, world: World, key: jax.Array, num_envs: int
+        self, world: World, key: jax.Array, num_envs: int, learned: jax.Array | None
     ) -> tuple[jax.Array, jax.Array, jax.Array]:
         """Random styles [B], kinds of start [B] and rows [B] of the pool, all int32."""
         key_kind, key_style, key_row = jax.random.split(key, 3)
@@ -99,9 +104,23 @@ class GetUpTask:
         draw = jax.random.uniform(key_kind, (num_envs,))
         stand, clip = self.config.stand_start, self.config.clip_start
         kind = jnp.where(draw < stand, 1, jnp.where(draw < stand + clip, 2, 0)).astype(jnp.int32)
+        if learned is not None:
+            weight = focus.weights(learned, world.pool, world.duration, self.config.focus)
+            getup, row = focus.draw(weight, kind, key_row)
+            return getup, kind, row
         getup = jax.random.randint(key_style, (num_envs,), 0, num_styles)
         row = jax.random.randint(key_row, (num_envs,), 0, rows)
         return getup, kind, row
+
+    def _learned(self, world: World, state: EpisodeState, output: StepOutput) -> jax.Array | None:
+        """The focus after the episodes that end with this step."""
+        if state.focus is None:
+            return None
+        steps = state.record.rise_steps + state.record.stand_steps
+        begin = (state.time - steps * self.engine.control_dt) / state.duration
+        cell = (state.kind, state.getup, focus.bin_of(begin))
+        success = output.truncated & stands(state.record)
+        return focus.update(state.focus, cell, output.terminated | output.truncated, success)
 
     def start(
         self,

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from tiny_task import CONFIG, tiny_task
+
+from getup_jax.tasks import focus
+from getup_jax.tasks.episode import CLIP, LYING, STANDING
+
+
+def test_parts_of_the_curve():
+    begin = jnp.asarray([0.0, 0.124, 0.125, 0.99, 1.0, 1.3])
+    np.testing.assert_array_equal(focus.bin_of(begin), [0, 0, 1, 7, 7, 7])
+
+
+def test_weights_fall_with_the_success_of_the_entrys_cell(built):
+    pool, duration = built.world.pool, built.world.duration
+    learned = focus.first(pool).at[CLIP, 0, 0].set(1.0).at[LYING, 1, 0].set(0.5)
+    weight = np.asarray(focus.weights(learned, pool, duration, 0.8))
+    assert weight.shape == pool.table.shape
+    np.testing.assert_allclose(weight[LYING, 0], 1.0)
+    np.testing.assert_allclose(weight[LYING, 1], 0.6)
+    early = np.asarray(pool.time[pool.table[CLIP, 0]]) < 0.125  # of a clip of one second
+    np.testing.assert_allclose(weight[CLIP, 0], np.where(early, 0.2, 1.0), atol=1e-6)
+
+
+def test_draws_are_in_proportion_to_the_weights():
+    weight = jnp.asarray(np.random.default_rng(0).uniform(0.1, 1.0, (3, 2, 4)), jnp.float32)
+    kind = jnp.tile(jnp.arange(3), 20_000)
+    getup, row = map(np.asarray, focus.draw(weight, kind, jax.random.PRNGKey(0)))
+    for k in range(3):
+        mine = np.asarray(kind) == k
+        count = np.zeros((2, 4))
+        np.add.at(count, (getup[mine], row[mine]), 1)
+        np.testing.assert_allclose(count / mine.sum(), weight[k] / weight[k].sum(), atol=0.01)
+
+
+def test_a_cell_moves_to_its_episodes_results_and_the_others_stay():
+    learned = jnp.full((3, 2, focus.BINS), 0.5)
+    cell = (jnp.asarray([0, 0, 1, 2]), jnp.asarray([0, 0, 1, 1]), jnp.asarray([3, 3, 0, 7]))
+    ended = jnp.asarray([True, True, True, False])
+    success = jnp.asarray([True, False, True, True])
+    after = np.asarray(focus.update(learned, cell, ended, success))
+    # one episode after the other, the good one and the bad one in either order, moves as far
+    assert after[0, 0, 3] == pytest.approx(0.5)
+    assert after[1, 1, 0] == pytest.approx(0.5 + focus.RATE * 0.5)
+    assert after[2, 1, 7] == 0.5
+    assert (np.delete(after.ravel(), [3, 24]) == 0.5).all()
+
+
+def test_the_task_follows_the_success_of_its_starts(character):
+    config = dataclasses.replace(CONFIG, task=dataclasses.replace(CONFIG.task, focus=0.9))
+    built = tiny_task(character, config)
+    env, world = built.environment, built.world
+    state = env.init(world, jax.random.PRNGKey(0), 8)
+    assert state.focus.shape == (3, 2, focus.BINS)
+    ends = state.duration + config.task.stand_time_s
+    state = state.replace(time=ends, focus=state.focus + 0.5)
+    after, output = jax.jit(env.step)(world, state, jnp.zeros((8, env.action_size)))
+    assert bool(output.truncated.all())
+    # who started standing stands in this one step, and nobody else does
+    moved = np.argwhere(np.asarray(after.focus) != 0.5)
+    value = np.asarray(after.focus)[tuple(moved.T)]
+    np.testing.assert_array_equal(value > 0.5, moved[:, 0] == STANDING)
+    assert set(moved[:, 0]) == set(np.asarray(state.kind).tolist())
+    assert len(set(moved[:, 0])) > 1
