@@ -16,7 +16,7 @@ from getup_jax import checkpoint, eval_plot, video
 from getup_jax.algo.learner import Learner, make_learner
 from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.conditions import Conditions, blended, make_plan
-from getup_jax.config import Config
+from getup_jax.config import Config, TaskConfig
 from getup_jax.episodes import Episodes, run_episodes
 from getup_jax.motion.clips import GetUp
 from getup_jax.nets import prior as pose_prior
@@ -79,8 +79,8 @@ def evaluate(
 def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
     """The training config with the starts that are asked for, as many as there are episodes.
 
-    Start noise is that of the arguments, not of the training, so that two policies meet the
-    same starts.
+    Start noise is that of the arguments and the early-end rule is the default one, that of the
+    paper, not those of the training, so that two policies meet the same starts and the same rule.
     """
     physics, task = config.physics, config.task
     if args.engine is not None:
@@ -92,6 +92,7 @@ def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
         stand_start=float(args.start == "standing"),
         clip_start=0.0,
         start_noise_rad=args.start_noise,
+        terminate_reward=TaskConfig.terminate_reward,
         pool_size=args.episodes,
         stand_time_s=stand_time_s,
     )
