@@ -104,7 +104,7 @@ class TaskConfig:
     stand_start: float = 0.3  # share of episodes that start standing
     clip_start: float = 0.0  # share that starts along the reference clip, or one that fits
     curve_match_rad: float = 0.52  # largest gap between a curve's and a pose's torso angles
-    focus: float = 0.0  # 0: starts are drawn evenly; towards 1: the more, the more often they fail
+    focus: float = 0.0  # 0: starts are drawn evenly; towards 1: at the frontier of what is learned
     start_noise_rad: float = 0.0  # joint noise of the start poses
     pool_size: int = 2048  # start states made once
     settle_s: float = 0.5  # lying starts rest this long before the pool keeps them

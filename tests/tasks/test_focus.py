@@ -17,15 +17,33 @@ def test_parts_of_the_curve():
     np.testing.assert_array_equal(focus.bin_of(begin), [0, 0, 1, 7, 7, 7])
 
 
-def test_weights_fall_with_the_success_of_the_entrys_cell(built):
+def test_the_frontier_is_before_what_is_solved_and_where_success_is_uncertain():
+    learned = np.zeros((3, 2, focus.BINS), np.float32)
+    learned[CLIP, 0] = [0.0, 0.0, 0.0, 0.0, 0.3, 1.0, 1.0, 1.0]
+    used = np.ones(learned.shape, bool)
+    used[CLIP, 0, 3] = False
+    near = np.asarray(focus.frontier(jnp.asarray(learned), jnp.asarray(used)))
+    # part 4: 4 p (1 - p) = .84 > 1 - .3; part 2: the next part with starts is 4
+    np.testing.assert_allclose(near[CLIP, 0], [0, 0, 0.3, 0.3, 0.84, 0, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(near[LYING, 0], 0.0)  # the first part is hopeless yet
+    np.testing.assert_allclose(near[STANDING, 0], 1.0)
+    np.testing.assert_allclose(near[CLIP, 1], [0, 0, 0, 0, 0, 0, 0, 1])
+    learned[CLIP, 0, 0] = 0.9
+    learned[LYING, 0, 0] = 0.2
+    near = np.asarray(focus.frontier(jnp.asarray(learned), jnp.asarray(used)))
+    assert near[LYING, 0, 0] == pytest.approx(0.7)
+
+
+def test_weights_follow_the_frontier_of_the_entrys_cell(built):
     pool, duration = built.world.pool, built.world.duration
-    learned = focus.first(pool).at[CLIP, 0, 0].set(1.0).at[LYING, 1, 0].set(0.5)
+    learned = focus.first(pool).at[STANDING].set(1.0)
     weight = np.asarray(focus.weights(learned, pool, duration, 0.8))
     assert weight.shape == pool.table.shape
-    np.testing.assert_allclose(weight[LYING, 0], 1.0)
-    np.testing.assert_allclose(weight[LYING, 1], 0.6)
-    early = np.asarray(pool.time[pool.table[CLIP, 0]]) < 0.125  # of a clip of one second
-    np.testing.assert_allclose(weight[CLIP, 0], np.where(early, 0.2, 1.0), atol=1e-6)
+    np.testing.assert_allclose(weight[STANDING], 0.2, atol=1e-6)
+    last = np.asarray(
+        pool.time[pool.table[CLIP, 0]]
+    )  # of a clip of one second with frames at 0, 0.5
+    np.testing.assert_allclose(weight[CLIP, 0], np.where(last > 0.25, 1.0, 0.2), atol=1e-6)
 
 
 def test_draws_are_in_proportion_to_the_weights():

@@ -1,8 +1,9 @@
-"""Starts that fail are drawn more often than those that are learned already.
+"""Starts at the frontier of what the policy can do are drawn more often than the others.
 
-Success is followed in cells: kind of start x style x part of the curve at which it starts. A solved
-episode is several times as long as one that fails, so that with even draws most samples would come
-from what the policy can do.
+Success is followed in cells: kind of start x style x part of the curve at which it starts. At the
+frontier a start sometimes succeeds, or it fails and the next part of the curve is solved (reverse
+curriculum, Florensa et al. 2017). A solved episode is several times as long as one that fails, so
+that with even draws most samples would come from what needs no more practice.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
+from getup_jax.tasks.episode import CLIP
 from getup_jax.tasks.reset_pool import Pool
 
 BINS = 8  # parts of a curve
@@ -28,9 +30,30 @@ def bin_of(begin: jax.Array) -> jax.Array:
 
 
 def weights(learned: jax.Array, pool: Pool, duration: jax.Array, focus: float) -> jax.Array:
-    """Weight [3, G, M] of every entry of the pool's table: 1 - focus * success of its cell."""
+    """Weight [3, G, M] of every entry of the pool's table: 1 - focus + focus * frontier."""
     part = bin_of(pool.time[pool.table] / duration[:, None])
-    return 1.0 - focus * jnp.take_along_axis(learned, part, axis=-1)
+    kinds, styles, _ = part.shape
+    place = (jnp.arange(kinds)[:, None, None], jnp.arange(styles)[None, :, None], part)
+    used = jnp.zeros(learned.shape, bool).at[place].set(True)
+    return 1.0 - focus + focus * jnp.take_along_axis(frontier(learned, used), part, axis=-1)
+
+
+def frontier(learned: jax.Array, used: jax.Array) -> jax.Array:
+    """How near [3, G, BINS] (0 to 1) every cell is to the frontier; used: the pool has its starts.
+
+    The larger of 4 p (1 - p) and q - p, where p is the cell's success and q that of the next part
+    of the curve that has starts. After the last part comes success itself, and after a lying start
+    what starts along the curve.
+    """
+    following, near = jnp.ones(learned.shape[1:2]), []
+    for part in reversed(range(BINS)):  # of the starts along the curve
+        near.append(following)
+        following = jnp.where(used[CLIP, :, part], learned[CLIP, :, part], following)
+    along = jnp.stack(near[::-1], axis=-1)
+    ahead = jnp.stack(
+        [jnp.broadcast_to(following[:, None], along.shape), jnp.ones_like(along), along]
+    )
+    return jnp.maximum(4.0 * learned * (1.0 - learned), ahead - learned)
 
 
 def draw(weight: jax.Array, kind: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
