@@ -1,9 +1,13 @@
-"""The ground: one interface for its height, flat for now."""
+"""The ground as the task sees it: height, normal and clearance at any place, inside jit.
+
+`Terrain` is the flat plane, `HeightField` an irregular ground; a world holds one of them.
+"""
 
 from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 
 
@@ -21,3 +25,72 @@ class Terrain:
     def height(self, xy: jax.Array) -> jax.Array:
         """Ground height [...] (m) at positions xy [..., 2] (m)."""
         return jnp.broadcast_to(self.level, xy.shape[:-1])
+
+    def normal(self, xy: jax.Array) -> jax.Array:
+        """Unit normal [..., 3] of the ground at xy [..., 2] (m)."""
+        return jnp.broadcast_to(jnp.array([0.0, 0.0, 1.0]), (*xy.shape[:-1], 3))
+
+    def clearance(self, centre: jax.Array, radius: float) -> jax.Array:
+        """Gap [...] (m) between the ground and spheres around centre [..., 3] (m)."""
+        return centre[..., 2] - radius - self.height(centre[..., :2])
+
+
+@struct.dataclass
+class HeightField:
+    """Ground over a regular grid of heights, triangulated as MuJoCo collides with it.
+
+    MuJoCo splits every cell along the diagonal from its lower to its upper corner in x and y. Over
+    one triangle the height is a + p u + q v, where u and v in [0, 1] are the place in the cell and
+    a is the height of its lower corner. Beyond the field's edge the height of the edge goes on.
+    """
+
+    planes: jax.Array  # [2 (ny - 1) (nx - 1), 3] a, p, q (m), both triangles of a cell in turn
+    size: jax.Array  # [2] int32 cells along x and y
+    origin: jax.Array  # [2] x and y of the grid's first point (m)
+    step: jax.Array  # [] m between two points
+
+    @classmethod
+    def of(cls, heights: np.ndarray, origin: np.ndarray, step: float) -> HeightField:
+        """The field of heights [ny, nx] (m); the first is at `origin` [2] (m)."""
+        z = np.asarray(heights, np.float64)
+        a, b, c, d = z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]
+        below = np.stack([a, b - a, d - b], axis=-1)  # u > v
+        above = np.stack([a, d - c, c - a], axis=-1)
+        return cls(
+            planes=jnp.asarray(np.stack([below, above], axis=2).reshape(-1, 3), jnp.float32),
+            size=jnp.asarray([z.shape[1] - 1, z.shape[0] - 1], jnp.int32),
+            origin=jnp.asarray(origin, jnp.float32),
+            step=jnp.asarray(step, jnp.float32),
+        )
+
+    def height(self, xy: jax.Array) -> jax.Array:
+        """Ground height [...] (m) at positions xy [..., 2] (m)."""
+        plane, place = self._triangle(xy)
+        return plane[..., 0] + jnp.sum(plane[..., 1:] * place, axis=-1)
+
+    def normal(self, xy: jax.Array) -> jax.Array:
+        """Unit normal [..., 3] of the triangle at xy [..., 2] (m)."""
+        return self._unit_normal(self._triangle(xy)[0])
+
+    def clearance(self, centre: jax.Array, radius: float) -> jax.Array:
+        """Gap [...] (m) between spheres around centre [..., 3] (m) and the triangles below them."""
+        plane, place = self._triangle(centre[..., :2])
+        above = centre[..., 2] - plane[..., 0] - jnp.sum(plane[..., 1:] * place, axis=-1)
+        return above * self._unit_normal(plane)[..., 2] - radius
+
+    def _triangle(self, xy: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """The plane [..., 3] of the triangle at xy, and the place (u, v) [..., 2] in its cell."""
+        grid = (xy - self.origin) / self.step
+        cell = jnp.clip(jnp.floor(grid).astype(jnp.int32), 0, self.size - 1)
+        place = jnp.clip(grid - cell, 0.0, 1.0)
+        upper = (place[..., 1] >= place[..., 0]).astype(jnp.int32)
+        index = 2 * (cell[..., 1] * self.size[0] + cell[..., 0]) + upper
+        return self.planes[index], place
+
+    def _unit_normal(self, plane: jax.Array) -> jax.Array:
+        slope = plane[..., 1:] / self.step
+        normal = jnp.concatenate([-slope, jnp.ones_like(slope[..., :1])], axis=-1)
+        return normal / jnp.linalg.norm(normal, axis=-1, keepdims=True)
+
+
+Ground = Terrain | HeightField
