@@ -127,13 +127,13 @@ class TerrainConfig:
     """
 
     seed: int = 0  # another seed is another ground of the same kind
-    region_size_m: float = 32.0  # side of a region, a square
+    region_size_m: float = 48.0  # side of a region, a square
     border_m: float = 4.0  # flat ground around the regions
     grid_step_m: float = 0.5  # between two heights of the field
     tile_m: float = 1.0  # side of a tile of the rough ground
     rough_m: tuple[float, ...] = (0.06, 0.13, 0.2)  # its corners move up or down by at most this
     slope_deg: tuple[float, ...] = (10.0, 20.0, 30.0)  # steepest slope of easy, medium, hard
-    slope_block_m: float = 8.0  # side of a hill or hollow
+    slope_block_m: float = 12.0  # diameter of a hill or hollow
     drops: int = 5000  # rag-dolls dropped on the irregular regions for lying starts
     curriculum: str = "success"  # what opens the next region: success | schedule | none (all open)
     unlock_successes: int = 200  # success: this many in the newest region
@@ -161,8 +161,8 @@ class TerrainConfig:
         ok = self.grid_step_m >= 0.5
         expected = "at least 0.5 m, since collisions with a finer field are slow"
         _require(ok, "terrain.grid_step_m", expected, self.grid_step_m)
-        ok = self.slope_block_m >= 6
-        expected = "at least 6 m, so that a lying body has room on one slope"
+        ok = self.slope_block_m >= 8
+        expected = "at least 8 m, so that a lying body has room on one slope"
         _require(ok, "terrain.slope_block_m", expected, self.slope_block_m)
         ok = self.region_size_m >= 2 * self.slope_block_m
         expected = f"at least 2 x terrain.slope_block_m = {2 * self.slope_block_m:g} m"

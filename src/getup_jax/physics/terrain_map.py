@@ -15,11 +15,12 @@ import dataclasses
 import numpy as np
 
 from getup_jax.config import ConfigError, TerrainConfig
+from getup_jax.physics.terrain import HeightField
 
 REGIONS = ("flat", "easy", "medium", "hard")
 _SPAWN_STEP_M = 0.5  # side of a spawn cell
-_SPAWN_MARGIN_M = 1.0  # from the edges of a region, and from the foot and top of a slope
-_CREASE_MARGIN_M = 0.6  # from the edge between two slopes
+_SPAWN_MARGIN_M = 1.0  # from the edges of a region, and from the foot of a slope
+_CREASE_MARGIN_M = 0.7  # from the edge between two slopes
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -42,6 +43,10 @@ class TerrainMap:
     def origin(self) -> np.ndarray:
         """x and y [2] of the first point of the grid (m)."""
         return np.array([-self.half, -self.half])
+
+    def field(self) -> HeightField:
+        """The same ground as the task sees it, in NumPy."""
+        return HeightField.of(self.heights, self.origin, self.step)
 
     def region(self, xy: np.ndarray) -> np.ndarray:
         """Index into REGIONS of places xy [..., 2] (m); -1 outside all of them."""
@@ -84,9 +89,10 @@ def make_terrain(config: TerrainConfig) -> TerrainMap:
 
 
 def _slopes(config: TerrainConfig, level: int, rng: np.random.Generator) -> np.ndarray:
-    """Heights of half a region: blocks that rise or fall evenly from their edges to their middle.
+    """Heights of half a region: in every block a hill or hollow of four even slopes.
 
-    Every block has another slope, evenly spread up to the steepest one of the level.
+    Every block has another slope, evenly spread up to the steepest one of the level. The edges
+    between two slopes run along x and y, where MuJoCo's triangles do not cut them off.
     """
     block, step = round(config.slope_block_m / config.grid_step_m), config.grid_step_m
     columns = round(config.region_size_m / config.slope_block_m)
@@ -95,8 +101,8 @@ def _slopes(config: TerrainConfig, level: int, rng: np.random.Generator) -> np.n
     share = (1 + rng.permutation(rows * columns)) / (rows * columns)
     slope = np.radians(gentlest + (config.slope_deg[level] - gentlest) * share)
     rise = np.tan(slope) * rng.choice([-1, 1], size=len(slope))
-    distance = np.minimum(np.arange(block + 1), block - np.arange(block + 1)) * step
-    pyramid = np.minimum(distance[:, None], distance[None, :])
+    outwards = np.abs(np.arange(block + 1) - block / 2) * step
+    pyramid = np.maximum(config.slope_block_m / 2 - outwards[:, None] - outwards, 0.0) / np.sqrt(2.0)
     heights = np.zeros((rows * block + 1, columns * block + 1))
     for index, factor in enumerate(rise):
         y, x = block * (index // columns), block * (index % columns)
@@ -145,7 +151,5 @@ def _on_a_face(config: TerrainConfig, x: np.ndarray, y: np.ndarray) -> np.ndarra
     """Whether places of a region are on one even slope with room around them."""
     half = config.slope_block_m / 2
     offset = np.abs(np.stack([x, y]) % config.slope_block_m - half)  # from the middle
-    far, near = offset.max(axis=0), offset.min(axis=0)
-    crease = (far - near) / np.sqrt(2.0)
-    return (half - far >= _SPAWN_MARGIN_M) & (crease >= _CREASE_MARGIN_M)
-
+    from_foot = (half - offset.sum(axis=0)) / np.sqrt(2.0)
+    return (from_foot >= _SPAWN_MARGIN_M) & (offset.min(axis=0) >= _CREASE_MARGIN_M)
