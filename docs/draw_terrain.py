@@ -21,7 +21,8 @@ from getup_jax.physics.terrain_map import TerrainMap, make_terrain
 from getup_jax.settings import load_config
 
 WIDTH, HEIGHT = 960, 640  # pixels
-AZIMUTH_DEG, ELEVATION_DEG = 115.0, -35.0
+AZIMUTH_DEG, ELEVATION_DEG = 115.0, -32.0
+COLOURS = 48  # of the palette, which keeps the file small
 
 
 def main() -> None:
@@ -38,7 +39,8 @@ def main() -> None:
     low, high = save_heights(ground, args.out / "terrain_heights.png")
     print(f"terrain_heights.png: {ground.heights.shape} heights, {low:.3f} to {high:.3f} m")
     model = load_character(config.physics, ground).model
-    Image.fromarray(picture(model, 2.6 * ground.half)).save(args.out / "terrain.png")
+    image = Image.fromarray(picture(model, 2.4 * ground.half))
+    image.quantize(COLOURS).save(args.out / "terrain.png", optimize=True)
 
 
 def save_heights(ground: TerrainMap, file: Path) -> tuple[float, float]:
@@ -51,6 +53,7 @@ def save_heights(ground: TerrainMap, file: Path) -> tuple[float, float]:
 
 def picture(model: mujoco.MjModel, distance: float) -> np.ndarray:
     """The whole ground [HEIGHT, WIDTH, 3] from above and aside, the character in its middle."""
+    model.stat.extent = distance  # how far the camera sees
     data, camera = mujoco.MjData(model), mujoco.MjvCamera()
     camera.azimuth, camera.elevation, camera.distance = AZIMUTH_DEG, ELEVATION_DEG, distance
     data.qpos[:] = model.key("neutral").qpos

@@ -249,7 +249,8 @@ class Config:
     seed: int = 0
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
-    prior: PriorConfig = field(default_factory=PriorConfig)
+    # None: no pose prior, the action is the servo target and no offset is unnatural
+    prior: PriorConfig | None = field(default_factory=PriorConfig)
     task: TaskConfig = field(default_factory=TaskConfig)
     terrain: TerrainConfig | None = None  # None: a flat plane
     network: NetworkConfig = field(default_factory=NetworkConfig)

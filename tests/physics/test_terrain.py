@@ -182,7 +182,10 @@ def test_a_spawn_outside_the_regions_is_an_error(ground):
         ({"slope_block_m": 2.0}, r"terrain\.slope_block_m: expected at least 8 m"),
         ({"region_size_m": 12.0}, r"terrain\.region_size_m: expected at least 2 x"),
         ({"region_size_m": 30.0}, r"terrain\.region_size_m: expected a multiple of 2 x"),
-        ({"tile_m": 0.75, "region_size_m": 24.0}, r"terrain\.tile_m: expected a multiple of terrain\.grid_step_m"),
+        (
+            {"tile_m": 0.75, "region_size_m": 24.0},
+            r"terrain\.tile_m: expected a multiple of terrain\.grid_step_m",
+        ),
         ({"tile_m": float("nan")}, r"terrain\.tile_m: expected more than 0"),
         ({"curriculum": "fast"}, r"terrain\.curriculum: expected one of"),
         ({"drops": 0}, r"terrain\.drops: expected more than 0"),

@@ -102,7 +102,9 @@ def _slopes(config: TerrainConfig, level: int, rng: np.random.Generator) -> np.n
     slope = np.radians(gentlest + (config.slope_deg[level] - gentlest) * share)
     rise = np.tan(slope) * rng.choice([-1, 1], size=len(slope))
     outwards = np.abs(np.arange(block + 1) - block / 2) * step
-    pyramid = np.maximum(config.slope_block_m / 2 - outwards[:, None] - outwards, 0.0) / np.sqrt(2.0)
+    pyramid = np.maximum(config.slope_block_m / 2 - outwards[:, None] - outwards, 0.0) / np.sqrt(
+        2.0
+    )
     heights = np.zeros((rows * block + 1, columns * block + 1))
     for index, factor in enumerate(rise):
         y, x = block * (index // columns), block * (index % columns)

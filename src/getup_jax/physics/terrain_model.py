@@ -10,6 +10,7 @@ from getup_jax.physics.terrain_map import TerrainMap
 
 FLOOR = "floor"  # the ground's geom, plane or height field
 _BASE_M = 1.0  # how far the solid ground reaches below its lowest point
+_VIEW_M = 3.0  # what cameras see reaches from a hundredth to fifty times as far
 _STUD_M = 0.01  # radius of the studs under the soles
 _GROUND_ONLY = 2  # collision bit that only the ground answers to
 
@@ -37,6 +38,7 @@ def replace_floor(spec: mujoco.MjSpec, ground: TerrainMap) -> None:
     )
     spec.delete(plane)
     spec.geom("terrain").name = FLOOR
+    spec.stat.extent = _VIEW_M  # by default the field's size, which puts near bodies out of sight
     for light in spec.lights:
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL  # the file's lamps light its origin
     _add_studs(spec)

@@ -1,8 +1,8 @@
 """Starts that fail are drawn more often than those that are learned already.
 
-Success is followed in cells: kind of start x style x part of the curve at which it starts. A solved
-episode is several times as long as one that fails, so that with even draws most samples would come
-from what the policy can do.
+Success is followed in cells: place x style x part of the curve at which it starts, where a place is
+a kind of start in a region (the kind alone on a flat plane). A solved episode is several times as
+long as one that fails, so that with even draws most samples would come from what the policy can do.
 """
 
 from __future__ import annotations
@@ -17,9 +17,14 @@ RATE = 0.1  # share of an episode's result in its cell's running mean
 
 
 def first(pool: Pool) -> jax.Array:
-    """Running success [3, G, BINS] before any episode: none."""
-    kinds, styles, _ = pool.table.shape
-    return jnp.zeros((kinds, styles, BINS), jnp.float32)
+    """Running success [3 R, G, BINS] before any episode: none."""
+    kinds, regions, styles, _ = pool.table.shape
+    return jnp.zeros((kinds * regions, styles, BINS), jnp.float32)
+
+
+def place_of(pool: Pool, kind: jax.Array, region: jax.Array | None) -> jax.Array:
+    """Place [B] int32 of starts of the kinds [B] in the regions [B]; None: there is one region."""
+    return kind if region is None else kind * pool.table.shape[1] + region
 
 
 def bin_of(begin: jax.Array) -> jax.Array:
@@ -28,18 +33,27 @@ def bin_of(begin: jax.Array) -> jax.Array:
 
 
 def weights(learned: jax.Array, pool: Pool, duration: jax.Array, focus: float) -> jax.Array:
-    """Weight [3, G, M] of every entry of the pool's table: 1 - focus * success of its cell."""
-    part = bin_of(pool.time[pool.table] / duration[:, None])
-    return 1.0 - focus * jnp.take_along_axis(learned, part, axis=-1)
+    """Weight [3 R, G, M] of every entry of the pool's table: 1 - focus * success of its cell.
+
+    Zero for the styles that cannot start in a region.
+    """
+    table = pool.table.reshape(-1, *pool.table.shape[2:])
+    part = bin_of(pool.time[table] / duration[:, None])
+    weight = 1.0 - focus * jnp.take_along_axis(learned, part, axis=-1)
+    if pool.startable is None:
+        return weight
+    order, count = pool.startable.styles, pool.startable.count
+    startable = jnp.argsort(order, axis=-1) < count[:, None]  # [R, G]
+    return weight * jnp.tile(startable, (pool.table.shape[0], 1))[..., None]
 
 
-def draw(weight: jax.Array, kind: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Styles [B] and rows [B] int32 of starts of the given kinds [B], in proportion to weight."""
-    kinds, _, rows = weight.shape
-    total = jnp.cumsum(weight.reshape(kinds, -1), axis=-1)
-    share = jax.random.uniform(key, kind.shape)
+def draw(weight: jax.Array, place: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Styles [B] and rows [B] int32 of starts at the given places [B], in proportion to weight."""
+    places, _, rows = weight.shape
+    total = jnp.cumsum(weight.reshape(places, -1), axis=-1)
+    share = jax.random.uniform(key, place.shape)
     entry = jnp.stack([jnp.searchsorted(t, share * t[-1], side="right") for t in total])
-    chosen = jnp.minimum(entry[kind, jnp.arange(len(kind))], total.shape[-1] - 1)
+    chosen = jnp.minimum(entry[place, jnp.arange(len(place))], total.shape[-1] - 1)
     return (chosen // rows).astype(jnp.int32), (chosen % rows).astype(jnp.int32)
 
 

@@ -18,7 +18,7 @@ from getup_jax.physics.settle import settle
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 from getup_jax.tasks.falls import Starts, fall
-from getup_jax.tasks.reset_pool import FlatStarts, Pool, check_finite, kind_shares
+from getup_jax.tasks.reset_pool import FlatStarts, Pool, Startable, check_finite, kind_shares
 from getup_jax.tasks.stances import stand
 from getup_jax.tasks.start_cache import Request, cached_starts
 from getup_jax.types import Engine, PhysicsState
@@ -26,6 +26,7 @@ from getup_jax.types import Engine, PhysicsState
 _PLACE_CHUNK = 2048  # states that the engine makes at once: the native one keeps memory for each
 
 Log = Callable[[str], None]
+_Part = tuple[np.ndarray, np.ndarray, np.ndarray]  # qpos [n, 7 + J], qvel [n, 6 + J], time [n]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -52,45 +53,71 @@ def build_region_pool(
     its clip, and one that nothing fits is left out of the region.
     """
     irregular = _irregular_starts(site, config, log)
-    seconds = np.array([getup.duration for getup in getups])
-    rows = _rows(config, len(getups))
-    rng = np.random.default_rng(flat.seed)
-    table = np.zeros((3, len(REGIONS), len(getups), rows), np.int32)
-    parts = [_on_the_flat(flat, site, table, rows, rng)]
     fits = _fits(getups, irregular[LYING], site.character, config)
+    rows, rng = _rows(config, len(getups)), np.random.default_rng(flat.seed)
+    table = np.zeros((3, len(REGIONS), len(getups), rows), np.int32)
+    parts = [_on_the_flat(flat, site, table, rng)]
     startable = np.ones((len(REGIONS), len(getups)), bool)
     for region in range(1, len(REGIONS)):
-        startable[region] = fits[irregular[LYING].region == region].any(axis=0)
+        own = {kind: starts.region == region for kind, starts in irregular.items()}
+        startable[region] = fits[own[LYING]].any(axis=0)
         _check_region(startable[region], region, getups, config, log)
-        for style in range(len(getups)):
-            for kind in (LYING, STANDING):
-                own = irregular[kind].region == region
-                if kind == LYING and startable[region, style]:
-                    own &= fits[:, style]
-                index = rng.choice(np.flatnonzero(own), rows, replace=own.sum() < rows)
-                time = np.full(rows, seconds[style] if kind == STANDING else 0.0)
-                first = sum(len(part[2]) for part in parts)
-                table[kind, region, style] = first + np.arange(rows)
+        for kind in (LYING, STANDING):
+            used = np.zeros(len(own[kind]), int)
+            for style, getup in enumerate(getups):
+                fair = own[kind] & fits[:, style] if kind == LYING else own[kind]
+                # a style that cannot start here is never drawn, but its rows must hold something
+                index = _least_used(fair if fair.any() else own[kind], used, rows, rng)
+                time = np.full(rows, getup.duration if kind == STANDING else 0.0)
+                table[kind, region, style] = sum(len(p[2]) for p in parts) + np.arange(rows)
                 parts.append((irregular[kind].qpos[index], irregular[kind].qvel[index], time))
-            table[CLIP, region, style] = table[LYING, region, style]
+        table[CLIP, region] = table[LYING, region]
+    order = np.argsort(~startable, axis=1, kind="stable").astype(np.int32)
+    count = startable.sum(axis=1).astype(np.int32)
+    return _pool(parts, table, Startable(jnp.asarray(order), jnp.asarray(count)), site, engine)
+
+
+def _pool(
+    parts: list[_Part], table: np.ndarray, startable: Startable, site: Site, engine: Engine
+) -> Pool:
     qpos, qvel, time = (np.concatenate(part) for part in zip(*parts, strict=True))
     site.ground.check_spawn(qpos[:, :2])
     physics = place_in_chunks(engine, qpos, qvel)
     check_finite(physics, qpos)
-    order = np.argsort(~startable, axis=1, kind="stable").astype(np.int32)
-    return Pool(
-        physics=physics,
-        time=jnp.asarray(time, jnp.float32),
-        table=jnp.asarray(table),
-        styles=jnp.asarray(order),
-        style_count=jnp.asarray(startable.sum(axis=1), jnp.int32),
-    )
+    time = jnp.asarray(time, jnp.float32)
+    return Pool(physics=physics, time=time, table=jnp.asarray(table), startable=startable)
+
+
+def _least_used(
+    fair: np.ndarray, used: np.ndarray, count: int, rng: np.random.Generator
+) -> np.ndarray:
+    """`count` of the starts where fair [N], first those that fewer styles have: see used [N]."""
+    order = rng.permutation(np.flatnonzero(fair))
+    chosen = np.resize(order[np.argsort(used[order], kind="stable")], count)
+    np.add.at(used, chosen, 1)
+    return chosen
+
+
+def region_starts(pool: Pool, episodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Styles, rows and regions [N] int32 of episodes that visit all regions and styles in turn.
+
+    In a region come the styles that can start there, each with one row after the other. The same
+    pool gives the same places.
+    """
+    if pool.startable is None:
+        raise ValueError("region_starts: expected a pool of irregular ground")
+    order, count = np.asarray(pool.startable.styles), np.asarray(pool.startable.count)
+    number = np.arange(episodes)
+    region, visit = number % len(count), number // len(count)
+    style = order[region, visit % count[region]]
+    row = visit // count[region] % pool.table.shape[-1]
+    return style.astype(np.int32), row.astype(np.int32), region.astype(np.int32)
 
 
 def _rows(config: TaskConfig, styles: int) -> int:
     """M, the rows of every kind, region and style."""
     kinds = sum(share > 0 for share in kind_shares(config))
-    return max(1, config.pool_size // (styles * kinds * len(REGIONS)))
+    return -(-config.pool_size // (styles * kinds * len(REGIONS)))
 
 
 def _irregular_starts(site: Site, config: TaskConfig, log: Log) -> dict[int, Starts]:
@@ -112,10 +139,10 @@ def _irregular_starts(site: Site, config: TaskConfig, log: Log) -> dict[int, Sta
 
 
 def _on_the_flat(
-    flat: FlatStarts, site: Site, table: np.ndarray, rows: int, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """qpos, qvel and time of the flat region's starts, and their rows in the table."""
-    qpos, qvel, time, table[:, 0] = flat.make(rows)
+    flat: FlatStarts, site: Site, table: np.ndarray, rng: np.random.Generator
+) -> _Part:
+    """The flat region's starts, the first in the pool; their rows are written into the table."""
+    qpos, qvel, time, table[:, 0] = flat.make(table.shape[-1])
     qpos[:, :2] += site.ground.draw_spawn(0, len(qpos), rng)
     lying = np.unique(table[LYING, 0])
     qpos[lying], qvel[lying] = settle(site.character, qpos[lying], flat.config.settle_s)

@@ -27,16 +27,21 @@ _Start = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @struct.dataclass
+class Startable:
+    """The styles that have lying starts in each region of irregular ground."""
+
+    styles: jax.Array  # [R, G] int32, first those that can start there, then the others
+    count: jax.Array  # [R] int32, how many can
+
+
+@struct.dataclass
 class Pool:
     """P start states and which of them belong to which style."""
 
     physics: PhysicsState  # [P] rows
     time: jax.Array  # [P] s since the curve's start, for a duration of 1 x T
     table: jax.Array  # [3, R, G, M] int32 rows of every kind of start, region and style
-    # Irregular ground: styles [R, G] int32, first those that can start in the region, and how many
-    # these are, [R] int32. None: all can.
-    styles: jax.Array | None = None
-    style_count: jax.Array | None = None
+    startable: Startable | None = None  # None, a flat plane: every style can start everywhere
 
 
 def build_pool(
@@ -171,6 +176,7 @@ def angle_gap(qpos: np.ndarray, getup: GetUp, character: CharacterSpec) -> float
 
 
 def check_finite(physics: PhysicsState, qpos: np.ndarray) -> None:
+    """Raise ConfigError if the engine cannot have the start states qpos [P, 7 + J]."""
     finite = np.asarray(physics.kinematics.finite)
     if not finite.all():
         raise ConfigError(

@@ -78,7 +78,7 @@ def stand(
 def soles_touch(character: CharacterSpec, field: HeightField, qpos: np.ndarray) -> np.ndarray:
     """Whether both soles of poses qpos [N, 7 + J] are within CONTACT_M of the ground, [N]."""
     feet = link_gaps(character, field, qpos)[:, [character.link(f"foot_{s}") for s in SIDES]]
-    return (np.abs(feet) < CONTACT_M).all(axis=1)
+    return np.asarray((np.abs(feet) < CONTACT_M).all(axis=1))
 
 
 def _holding(character: CharacterSpec, field: HeightField, qpos: np.ndarray) -> np.ndarray:
@@ -145,7 +145,7 @@ def _solve(
 ) -> bool:
     """Turn the leg's hinges until its foot is there; whether it got there."""
     model, hinges = character.model, leg.dofs - 6
-    jacobian = np.zeros((6, model.nv))
+    jacobian, error = np.zeros((6, model.nv)), np.full(6, np.inf)
     for _ in range(_ITERATIONS):
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
