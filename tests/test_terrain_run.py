@@ -20,7 +20,7 @@ from getup_jax.tasks import region_pool
 from getup_jax.tasks.build import assemble
 
 PPO = PPOConfig(num_envs=8, num_steps=3, epochs=1, minibatch_size=24)
-TASK = dataclasses.replace(CONFIG.task, pool_size=96)
+TASK = dataclasses.replace(CONFIG.task, pool_size=96, focus=0.5)
 
 
 def build(config, prior: bool = True):
