@@ -38,7 +38,7 @@ def make_policy(task: BuiltTask, config: Config = SMALL) -> tuple[Learner, Polic
 
 def run(task: BuiltTask, conditions: Conditions, number: int) -> Episodes:
     learner, policy = make_policy(task)
-    _, styles, rows = task.world.pool.table.shape
+    *_, styles, rows = task.world.pool.table.shape
     plan = make_plan(conditions, number, styles, rows)
     return run_episodes(task, learner, policy, plan, lambda _: None)
 

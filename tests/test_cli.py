@@ -136,9 +136,10 @@ def test_eval_passes_its_arguments_on(monkeypatch):
     assert cli.eval_main([]) == 0
     options = ["--ckpt", "runs/a", "--episodes", "7", "--seed", "3", "--json", "a.json"]
     assert cli.eval_main([*options, "--video", "a.mp4", "--engine", "mjx"]) == 0
-    default = {"ckpt": "flat", "episodes": 100, "seed": 0, "start": "lying"}
+    default = {"ckpt": "flat", "episodes": None, "seed": 0, "start": "lying"}
     default |= {"start_noise": 0.0, "duration_scale": (1.0, 1.0)}
     default |= dict.fromkeys(["json", "video", "plot", "engine", "stand_time", "blend", "push"])
+    default |= {"terrain_seed": None}
     assert vars(seen[0]) == default
     assert vars(seen[1]) == default | {
         "ckpt": "runs/a",

@@ -107,7 +107,7 @@ def test_one_compile_serves_all_chunks_and_progress_ends_at_all(task, monkeypatc
     made, jit, done = [], jax.jit, []
     monkeypatch.setattr(jax, "jit", lambda *a, **k: made.append(jit(*a, **k)) or made[-1])
     learner, policy = make_policy(task)
-    plan = make_plan(PUSHED, 3, *task.world.pool.table.shape[1:])
+    plan = make_plan(PUSHED, 3, *task.world.pool.table.shape[2:])
     run_episodes(task, learner, policy, plan, done.append)
     monkeypatch.undo()
     assert [f._cache_size() for f in made if f.__name__ in ("start", "advance")] == [1, 1]

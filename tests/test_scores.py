@@ -18,8 +18,9 @@ KEYS = {
     "success", "success_low", "success_high", "return_rate", "height_error_m", "angle_error_rad",
     "stand_time_s", "jitter", "torque_nm", "energy_j", "saturation", "offset_rad", "foot_slip_m_s",
     "penetration_m", "penetration_max_m", "success_pushed", "episodes", "per_orientation",
-    "per_curve",
+    "per_curve", "per_region",
 }  # fmt: skip
+GROUPS = {"per_orientation", "per_curve", "per_region"}
 STEP_VALUES = ("torque", "power", "jerk", "saturation", "offset", "slip", "penetration")
 
 
@@ -212,13 +213,26 @@ def test_scores_by_the_way_of_lying():
     assert score(trace, style, lying, DT, STAND_S, STANDING).per_orientation is None
 
 
+def test_scores_by_region():
+    trace = make_trace(np.ones((3, 4)), success=np.array([True, False, True, False]))
+    region = np.array([0, 0, 3, 1])
+    scores = score(trace, np.zeros(4, int), styles("a"), DT, STAND_S, region=region)
+    found = {name: (x.episodes, x.success) for name, x in scores.per_region.items()}
+    assert found == {"flat": (2, 0.5), "easy": (1, 0.0), "hard": (1, 1.0)}
+    assert (scores.per_region["flat"].success_low, scores.per_region["flat"].success_high) == (
+        wilson(1, 2)
+    )
+    assert set(to_json(scores)["per_region"]["hard"]) == KEYS - GROUPS
+    assert {"flat", "easy", "hard"} <= rows_of(table(scores)).keys()
+
+
 def test_json_has_every_score_and_no_nan():
     trace = make_trace(np.full((3, 2), 0.5), success=False)
     result = to_json(score(trace, np.array([0, 1]), styles("a", "b"), DT, STAND_S))
     assert set(result) == KEYS
     assert set(result["per_curve"]) == {"a", "b"}
-    assert set(result["per_curve"]["a"]) == KEYS - {"per_curve", "per_orientation"}
-    assert set(result["per_orientation"]["supine"]) == KEYS - {"per_curve", "per_orientation"}
+    assert set(result["per_curve"]["a"]) == KEYS - GROUPS
+    assert set(result["per_orientation"]["supine"]) == KEYS - GROUPS
     assert result["stand_time_s"] is None  # nothing stood
     assert result["success"] == 0.0
     text = json.dumps(result, allow_nan=False)

@@ -15,7 +15,8 @@ from getup_jax.motion import events
 from getup_jax.motion.clips import GetUp
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.tasks.episode import LYING, STANDING
-from getup_jax.tasks.reset_pool import angle_gap
+from getup_jax.tasks.region_pool import region_starts
+from getup_jax.tasks.reset_pool import Pool, angle_gap
 
 PUSH_AFTER_S = 1.0  # a push comes at the first chance this long after the curve's end
 
@@ -62,6 +63,12 @@ class Plan:
     row: np.ndarray  # [N] int32, row of the pool's table
     duration_scale: np.ndarray  # [N] float32
     impulse: np.ndarray  # [N, 3] Ns, zero: no push
+    region: np.ndarray | None = None  # [N] int32 index into REGIONS; None: a flat plane
+
+    def on_regions(self, pool: Pool) -> Plan:
+        """The same on irregular ground: its regions in turn, and the styles that start there."""
+        getup, row, region = region_starts(pool, len(self.getup))
+        return dataclasses.replace(self, getup=getup, row=row, region=region)
 
 
 def make_plan(conditions: Conditions, episodes: int, num_styles: int, rows: int) -> Plan:

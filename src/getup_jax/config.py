@@ -120,6 +120,67 @@ class TaskConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class TerrainConfig:
+    """Irregular ground in four regions: flat, easy, medium and hard [P 3.2, 5.4].
+
+    Half of each irregular region is rough, and half has even slopes in all directions.
+    """
+
+    seed: int = 0  # another seed is another ground of the same kind
+    region_size_m: float = 48.0  # side of a region, a square
+    border_m: float = 4.0  # flat ground around the regions
+    grid_step_m: float = 0.5  # between two heights of the field
+    tile_m: float = 1.0  # side of a tile of the rough ground
+    rough_m: tuple[float, ...] = (0.06, 0.13, 0.2)  # its corners move up or down by at most this
+    slope_deg: tuple[float, ...] = (10.0, 20.0, 30.0)  # steepest slope of easy, medium, hard
+    slope_block_m: float = 12.0  # diameter of a hill or hollow
+    drops: int = 5000  # rag-dolls dropped on the irregular regions for lying starts
+    curriculum: str = "success"  # what opens the next region: success | schedule | none (all open)
+    unlock_successes: int = 200  # success: this many in the newest region
+    schedule_steps: int = 20_000_000  # schedule: control steps a region
+
+    def __post_init__(self) -> None:
+        for name in ("region_size_m", "grid_step_m", "tile_m", "slope_block_m"):
+            _require(getattr(self, name) > 0, f"terrain.{name}", "more than 0", getattr(self, name))
+        for name in ("unlock_successes", "schedule_steps", "drops"):
+            _require(getattr(self, name) > 0, f"terrain.{name}", "more than 0", getattr(self, name))
+        for name in ("rough_m", "slope_deg"):
+            values = getattr(self, name)
+            ok = len(values) == 3 and 0 <= values[0] <= values[1] <= values[2]
+            expected = "three values of at least 0 that do not fall: easy, medium, hard"
+            _require(ok, f"terrain.{name}", expected, values)
+        ok = max(self.slope_deg) <= 60
+        _require(ok, "terrain.slope_deg", "at most 60 degrees", self.slope_deg)
+        kinds = ("success", "schedule", "none")
+        ok = self.curriculum in kinds
+        _require(ok, "terrain.curriculum", f"one of {kinds}", self.curriculum)
+        self._check_sizes()
+
+    def _check_sizes(self) -> None:
+        _require(self.border_m >= 2, "terrain.border_m", "at least 2 m", self.border_m)
+        ok = self.grid_step_m >= 0.5
+        expected = "at least 0.5 m, since collisions with a finer field are slow"
+        _require(ok, "terrain.grid_step_m", expected, self.grid_step_m)
+        ok = self.slope_block_m >= 8
+        expected = "at least 8 m, so that a lying body has room on one slope"
+        _require(ok, "terrain.slope_block_m", expected, self.slope_block_m)
+        ok = self.region_size_m >= 2 * self.slope_block_m
+        expected = f"at least 2 x terrain.slope_block_m = {2 * self.slope_block_m:g} m"
+        _require(ok, "terrain.region_size_m", expected, self.region_size_m)
+        pairs = (
+            ("region_size_m", 2 * self.slope_block_m, "2 x terrain.slope_block_m"),
+            ("region_size_m", 2 * self.tile_m, "2 x terrain.tile_m"),
+            ("slope_block_m", 2 * self.grid_step_m, "2 x terrain.grid_step_m"),
+            ("tile_m", self.grid_step_m, "terrain.grid_step_m"),
+            ("border_m", self.grid_step_m, "terrain.grid_step_m"),
+        )
+        for name, unit, text in pairs:
+            value = getattr(self, name)
+            ok = abs(value / unit - round(value / unit)) < 1e-6 and value >= unit
+            _require(ok, f"terrain.{name}", f"a multiple of {text} = {unit:g} m", value)
+
+
+@dataclasses.dataclass(frozen=True)
 class NetworkConfig:
     """Actor and critic: separate multilayer perceptrons."""
 
@@ -188,8 +249,10 @@ class Config:
     seed: int = 0
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
-    prior: PriorConfig = field(default_factory=PriorConfig)
+    # None: no pose prior, the action is the servo target and no offset is unnatural
+    prior: PriorConfig | None = field(default_factory=PriorConfig)
     task: TaskConfig = field(default_factory=TaskConfig)
+    terrain: TerrainConfig | None = None  # None: a flat plane
     network: NetworkConfig = field(default_factory=NetworkConfig)
     ppo: PPOConfig = field(default_factory=PPOConfig)
     train: TrainConfig = field(default_factory=TrainConfig)

@@ -90,11 +90,18 @@ class Roller:
     kind: int
     feet: FootPoints
 
-    def start(self, world: Any, getup: jax.Array, row: jax.Array, scale: jax.Array) -> Carry:
-        """Fresh episodes [B]."""
+    def start(
+        self,
+        world: Any,
+        getup: jax.Array,
+        row: jax.Array,
+        scale: jax.Array,
+        region: jax.Array | None,
+    ) -> Carry:
+        """Fresh episodes [B]; see `Plan`."""
         env, size = self.env, len(getup)
         kind = jnp.full(size, self.kind, jnp.int32)
-        state = env.start(world, getup, kind, row, scale)
+        state = env.start(world, getup, kind, row, scale, region)
         hinges = env.character.num_joints
         return Carry(state, jnp.ones(size, bool), jnp.full((2, size, hinges), jnp.nan, jnp.float32))
 
@@ -152,8 +159,9 @@ def run_episodes(
         # the last batch is filled up, so that one program serves all of them
         index = np.minimum(np.arange(first, first + size), episodes - 1)
         keep = min(size, episodes - first)
+        region = None if plan.region is None else plan.region[index]
         starts = (plan.getup[index], plan.row[index], plan.duration_scale[index])
-        carry = start(task.world, *starts)
+        carry = start(task.world, *starts, region)
         chunks = []
         for chunk in _chunks(task, advance, policy, carry, plan.impulse[index]):
             chunks.append(jax.tree.map(lambda x, keep=keep: x[:, :keep], chunk))

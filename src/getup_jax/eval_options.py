@@ -37,10 +37,21 @@ def eval_parser() -> argparse.ArgumentParser:
         default="flat",
         help="a run folder, a checkpoint, or the name of a shipped policy (default: flat)",
     )
-    add("--episodes", type=positive, default=100, metavar="N", help="how many (default: 100)")
+    add(
+        "--episodes",
+        type=positive,
+        metavar="N",
+        help="how many (default: 100, on irregular ground 100 in each region)",
+    )
     add("--seed", type=natural, default=0, metavar="S", help="of the starts (default: 0)")
     add("--start", choices=("lying", "standing"), default="lying", help="(default: lying)")
     add("--stand-time", type=above_zero, metavar="S", help="seconds of standing (as trained)")
+    add(
+        "--terrain-seed",
+        type=natural,
+        metavar="S",
+        help="another irregular ground of the same kind (default: that of the training)",
+    )
     add("--engine", metavar="E", help="native, mjx or mjx-warp (default: as for training)")
     _add_conditions(parser.add_argument_group("harder conditions, each off by default"))
     _add_outputs(parser.add_argument_group("output files"))

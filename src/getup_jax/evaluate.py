@@ -16,16 +16,20 @@ from getup_jax import checkpoint, eval_plot, video
 from getup_jax.algo.learner import Learner, make_learner
 from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.conditions import Conditions, blended, make_plan
-from getup_jax.config import Config, TaskConfig
+from getup_jax.config import Config, ConfigError, TaskConfig, TerrainConfig
 from getup_jax.episodes import Episodes, run_episodes
 from getup_jax.motion.clips import GetUp
 from getup_jax.nets import prior as pose_prior
 from getup_jax.physics.character import CharacterSpec
+from getup_jax.physics.terrain_map import REGIONS
 from getup_jax.progress import Display
 from getup_jax.score_table import table
 from getup_jax.scores import Scores, score, to_json
 from getup_jax.storage import from_nested
 from getup_jax.tasks.build import BuiltTask, build_task
+
+_EPISODES = 100  # by default; on irregular ground in each region
+_DROPS = 1500  # rag-dolls on irregular ground
 
 
 def evaluate_command(args: argparse.Namespace) -> int:
@@ -39,11 +43,12 @@ def evaluate_command(args: argparse.Namespace) -> int:
     conditions = Conditions.of(args)
     config = evaluation_config(loaded.config, args)
     conditions.check(config)
-    with Display(args.episodes, unit="episodes") as display:
+    number = episode_count(loaded.config, args)
+    with Display(number, unit="episodes") as display:
         display.log(f"{loaded.path}: {loaded.metadata.get('steps', 0):,} steps of training")
-        episodes, scores = evaluate(config, loaded, conditions, args.episodes, display)
+        episodes, scores = evaluate(config, loaded, conditions, number, display)
     print(table(scores))
-    print(f"{args.episodes} episodes in {time.monotonic() - begin:.0f} s")
+    print(f"{number} episodes in {time.monotonic() - begin:.0f} s")
     if args.json is not None:
         facts = description(config, loaded, conditions, episodes)
         args.json.write_text(json.dumps({**to_json(scores), **facts}, indent=2) + "\n")
@@ -56,12 +61,15 @@ def evaluate(
 ) -> tuple[Episodes, Scores]:
     """Run and score the episodes; `config` is that of `evaluation_config`."""
     choose = _mixtures(config, conditions) if conditions.blend else None
-    task = build_task(config, display.log, pose_prior.from_dict(loaded.prior), choose)
+    prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
+    task = build_task(config, display.log, prior, choose)
     learner = _learner(config, task)
     template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0)).policy
     policy = from_nested(template, loaded.policy, str(loaded.path))
-    _, num_styles, rows = task.world.pool.table.shape
+    *_, num_styles, rows = task.world.pool.table.shape
     plan = make_plan(conditions, number, num_styles, rows)
+    if task.world.pool.startable is not None:
+        plan = plan.on_regions(task.world.pool)
     display.log("compiling the episode ...")
     episodes = run_episodes(task, learner, policy, plan, _Rate(display, number))
     control_dt = task.environment.engine.control_dt
@@ -72,6 +80,7 @@ def evaluate(
         control_dt,
         config.task.stand_time_s,
         conditions.kind,
+        plan.region,
     )
     return episodes, scores
 
@@ -93,10 +102,28 @@ def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
         clip_start=0.0,
         start_noise_rad=args.start_noise,
         terminate_reward=TaskConfig.terminate_reward,
-        pool_size=args.episodes,
+        pool_size=episode_count(config, args),
         stand_time_s=stand_time_s,
     )
-    return dataclasses.replace(config, physics=physics, task=task, seed=args.seed)
+    terrain = _evaluation_terrain(config.terrain, args.terrain_seed)
+    return dataclasses.replace(config, physics=physics, task=task, terrain=terrain, seed=args.seed)
+
+
+def episode_count(config: Config, args: argparse.Namespace) -> int:
+    """How many episodes: as many as asked for, or the default for the ground."""
+    regions = 1 if config.terrain is None else len(REGIONS)
+    return args.episodes or _EPISODES * regions
+
+
+def _evaluation_terrain(terrain: TerrainConfig | None, seed: int | None) -> TerrainConfig | None:
+    """The ground of the training, or another one of its kind; rag-dolls fall anew in any case."""
+    if terrain is None:
+        if seed is not None:
+            raise ConfigError("--terrain-seed: the policy was trained on a flat plane")
+        return None
+    own = terrain.seed if seed is None else seed
+    # another number of them falls otherwise than those of the training did
+    return dataclasses.replace(terrain, seed=own, drops=_DROPS - (terrain.drops == _DROPS))
 
 
 def description(
@@ -109,6 +136,7 @@ def description(
             **dataclasses.asdict(conditions),
             "stand_time_s": config.task.stand_time_s,
             "engine": episodes.task.environment.engine.name,
+            "terrain_seed": None if config.terrain is None else config.terrain.seed,
             "pushed_episodes": int(episodes.trace.pushed.any(axis=0).sum()),
         },
     }

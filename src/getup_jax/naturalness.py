@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.physics.terrain import Terrain
+from getup_jax.physics.terrain import Ground
 from getup_jax.rotation import rotate
 from getup_jax.types import Kinematics
 
@@ -55,7 +55,7 @@ class FootPoints:
         link, offset, radius = (np.array(part) for part in zip(*points, strict=True))
         return cls(link, offset.astype(np.float32), radius.astype(np.float32))
 
-    def slip(self, kinematics: Kinematics, terrain: Terrain) -> jax.Array:
+    def slip(self, kinematics: Kinematics, terrain: Ground) -> jax.Array:
         """Mean horizontal speed [B] (m/s) of the points that touch the ground; NaN: none does.
 
         A foot that rolls over an edge does not slip: the speed is that of the edge.
@@ -65,7 +65,7 @@ class FootPoints:
         point = kinematics.link_position[:, self.link] + arm
         turning = jnp.cross(kinematics.link_angular_velocity[:, self.link], arm)
         velocity = kinematics.link_linear_velocity[:, self.link] + turning
-        gap = point[..., 2] - self.radius - terrain.height(point[..., :2])
+        gap = terrain.clearance(point, jnp.asarray(self.radius))
         touches = gap < CONTACT_M
         speed = jnp.where(touches, jnp.linalg.norm(velocity[..., :2], axis=-1), 0.0)
         count = touches.sum(axis=-1)

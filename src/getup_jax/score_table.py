@@ -36,7 +36,7 @@ _Columns = tuple[tuple[str, str, str], ...]
 
 
 def table(scores: Scores) -> str:
-    """Two tables with the same rows: one a style, one a way of lying, one in total."""
+    """Two tables with the same rows: one a style, a way of lying and a region, one in total."""
     success = _SUCCESS
     if math.isnan(scores.success_pushed):
         success = tuple(column for column in _SUCCESS if column[0] != "success_pushed")
@@ -54,6 +54,7 @@ def _view(scores: Scores, columns: _Columns) -> Table:
         view.add_column(heading)
     _add_rows(view, columns, scores.per_curve or {})
     _add_rows(view, columns, scores.per_orientation or {})
+    _add_rows(view, columns, scores.per_region or {})
     _add_rows(view, columns, {"all": scores})
     return view
 

@@ -12,6 +12,7 @@ from scipy.stats import norm
 
 from getup_jax.conditions import orientation
 from getup_jax.motion.clips import GetUp
+from getup_jax.physics.terrain_map import REGIONS
 from getup_jax.tasks.episode import LYING
 
 ORIENTATIONS = ("supine", "prone", "side")
@@ -41,6 +42,7 @@ class Scores:
     episodes: int
     per_orientation: dict[str, Scores] | None = None  # supine, prone, side: how the curve starts
     per_curve: dict[str, Scores] | None = None
+    per_region: dict[str, Scores] | None = None  # of irregular ground, where an episode starts
 
 
 def score(
@@ -50,10 +52,12 @@ def score(
     control_dt: float,
     stand_time_s: float,
     kind: int = LYING,
+    region: np.ndarray | None = None,
 ) -> Scores:
     """Scores of a trace (see `episodes.Trace`, NumPy leaves [T, N, ...]).
 
-    In total, by style, and for lying starts by how the body lies.
+    In total, by style, for lying starts by how the body lies, and on irregular ground by region
+    [N], an index into REGIONS.
     """
     values = episode_values(trace, control_dt, stand_time_s)
     styles = np.array([style.name for style in getups])[getup]
@@ -62,6 +66,7 @@ def score(
         _mean(values),
         per_orientation=_split(values, lies, ORIENTATIONS) if kind == LYING else None,
         per_curve=_split(values, styles, [style.name for style in getups]),
+        per_region=None if region is None else _split(values, np.array(REGIONS)[region], REGIONS),
     )
 
 
@@ -132,9 +137,11 @@ def to_json(scores: Scores) -> dict[str, Any]:
         return None if isinstance(value, float) and math.isnan(value) else value
 
     result = clean(dataclasses.asdict(scores))
-    for groups in ("per_orientation", "per_curve"):
-        for part in (result[groups] or {}).values():
-            del part["per_orientation"], part["per_curve"]
+    groups = ("per_orientation", "per_curve", "per_region")
+    for group in groups:
+        for part in (result[group] or {}).values():
+            for inner in groups:
+                del part[inner]
     return result
 
 

@@ -95,14 +95,27 @@ def render(
     data, camera = mujoco.MjData(model), mujoco.MjvCamera()
     camera.distance, camera.elevation, camera.azimuth = 3.4, -14.0, view(qpos[0])
     images = []
+    ground = ground_below(model, qpos[0])
     with _renderer(model, size) as renderer:
         for row in qpos:
             data.qpos[:] = row
             mujoco.mj_kinematics(model, data)
-            camera.lookat[:] = (row[0], row[1], 0.65)
+            camera.lookat[:] = (row[0], row[1], ground + 0.65)
             renderer.update_scene(data, camera)
             images.append(renderer.render())
     return images
+
+
+def ground_below(model: mujoco.MjModel, qpos: np.ndarray) -> float:
+    """Height (m) of the ground below the pelvis in a pose [7 + J]; 0 on a plane."""
+    fields = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD)
+    if not len(fields):
+        return 0.0
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    above = np.array([qpos[0], qpos[1], qpos[2] + 10.0])
+    down = np.array([0.0, 0.0, -1.0])
+    return above[2] - mujoco.mj_rayHfield(model, data, int(fields[0]), above, down)
 
 
 def view(qpos: np.ndarray) -> float:

@@ -10,6 +10,7 @@ from tiny_task import CONFIG, tiny_task
 
 from getup_jax.tasks import focus
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
+from getup_jax.tasks.reset_pool import Startable
 
 
 def test_parts_of_the_curve():
@@ -38,10 +39,10 @@ def test_weights_follow_the_frontier_of_the_entrys_cell(built):
     pool, duration = built.world.pool, built.world.duration
     learned = focus.first(pool).at[STANDING].set(1.0)
     weight = np.asarray(focus.weights(learned, pool, duration, 0.8))
-    assert weight.shape == pool.table.shape
+    assert weight.shape == pool.table[:, 0].shape
     np.testing.assert_allclose(weight[STANDING], 0.2, atol=1e-6)
     last = np.asarray(
-        pool.time[pool.table[CLIP, 0]]
+        pool.time[pool.table[CLIP, 0, 0]]
     )  # of a clip of one second with frames at 0, 0.5
     np.testing.assert_allclose(weight[CLIP, 0], np.where(last > 0.25, 1.0, 0.2), atol=1e-6)
 
@@ -86,3 +87,19 @@ def test_the_task_follows_the_success_of_its_starts(character):
     np.testing.assert_array_equal(value > 0.5, moved[:, 0] == STANDING)
     assert set(moved[:, 0]) == set(np.asarray(state.kind).tolist())
     assert len(set(moved[:, 0])) > 1
+
+
+def test_styles_that_cannot_start_in_a_region_have_no_weight(built):
+    pool, duration = built.world.pool, built.world.duration
+    table = jnp.repeat(pool.table, 2, axis=1)  # two regions
+    startable = Startable(styles=jnp.asarray([[0, 1], [1, 0]]), count=jnp.asarray([2, 1]))
+    pool = pool.replace(table=table, startable=startable)
+    learned = focus.first(pool).at[2 * LYING + 1, 1].set(1.0)
+    weight = np.asarray(focus.weights(learned, pool, duration, 0.5))
+    assert weight.shape == (6, 2, table.shape[-1])
+    np.testing.assert_array_equal(weight[2 * LYING], 1.0)
+    np.testing.assert_array_equal(weight[2 * LYING + 1, 0], 0.0)
+    np.testing.assert_allclose(weight[2 * LYING + 1, 1], 0.5)
+    kind, region = jnp.asarray([LYING, STANDING, CLIP]), jnp.asarray([1, 0, 1])
+    np.testing.assert_array_equal(focus.place_of(pool, kind, region), 2 * kind + region)
+    np.testing.assert_array_equal(focus.place_of(pool, kind, None), kind)

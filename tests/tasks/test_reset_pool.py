@@ -24,7 +24,7 @@ def pool_of(character, engine, **changes):
 
 
 def rows(pool, kind: int, style: int) -> dict[str, np.ndarray]:
-    index = np.asarray(pool.table[kind, style])
+    index = np.asarray(pool.table[kind, 0, style])
     state = pool.physics.kinematics
     return {
         "qpos": np.asarray(state.qpos)[index],
@@ -40,7 +40,7 @@ def pool(character, engine):
 
 def test_every_kind_and_style_has_its_share_of_the_pool(pool):
     # 60 rows of three kinds and two styles
-    assert pool.table.shape == (3, 2, 10)
+    assert pool.table.shape == (3, 1, 2, 10)
     np.testing.assert_array_equal(np.sort(np.ravel(pool.table)), np.arange(60))
     assert pool.time.shape == (60,)
     assert np.asarray(pool.physics.kinematics.finite).all()
@@ -48,7 +48,7 @@ def test_every_kind_and_style_has_its_share_of_the_pool(pool):
 
 def test_a_kind_without_a_share_has_one_row_a_style(character, engine):
     pool = pool_of(character, engine, stand_start=0.0, clip_start=0.0)
-    assert pool.table.shape == (3, 2, 30)
+    assert pool.table.shape == (3, 1, 2, 30)
     assert len(np.unique(pool.table[LYING])) == 60
     assert len(np.unique(pool.table[STANDING])) == 2
     assert len(np.unique(pool.table[CLIP])) == 2
@@ -152,4 +152,4 @@ def test_a_wider_match_accepts_it(character, engine):
     points[0, 2] = 1.0
     curve = dataclasses.replace(curve, points=points)
     config = dataclasses.replace(TASK, curve_match_rad=1.2)
-    assert build_pool([clip, curve], character, engine, config, seed=0).table.shape == (3, 2, 10)
+    assert build_pool([clip, curve], character, engine, config, seed=0).table.shape == (3, 1, 2, 10)

@@ -12,6 +12,8 @@ import numpy as np
 
 from getup_jax.config import ConfigError, PhysicsConfig
 from getup_jax.paths import asset_path
+from getup_jax.physics.terrain_map import TerrainMap
+from getup_jax.physics.terrain_model import replace_floor
 
 _SOLVERS = {
     "auto": mujoco.mjtSolver.mjSOL_PGS,  # the MJX engine, which has none, takes Newton
@@ -66,9 +68,12 @@ class CharacterSpec:
         return np.concatenate([root, joints], axis=-1)
 
 
-def load_character(config: PhysicsConfig) -> CharacterSpec:
-    """Read the MJCF file that the config names and apply the config's physics settings."""
-    model = _compile(config)
+def load_character(config: PhysicsConfig, ground: TerrainMap | None = None) -> CharacterSpec:
+    """Read the MJCF file that the config names and apply the config's physics settings.
+
+    The character stands on its file's floor, a plane, or on the given ground in place of it.
+    """
+    model = _compile(config, ground)
     bodies = [model.body(i).name for i in range(1, model.nbody)]
     hinges = [i for i in range(model.njnt) if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE]
     names = tuple(model.joint(i).name for i in hinges)
@@ -98,8 +103,10 @@ def character_file(name: str) -> Path:
     return path
 
 
-def _compile(config: PhysicsConfig) -> mujoco.MjModel:
+def _compile(config: PhysicsConfig, ground: TerrainMap | None) -> mujoco.MjModel:
     spec = mujoco.MjSpec.from_file(str(character_file(config.character)))
+    if ground is not None:
+        replace_floor(spec, ground)
     spec.option.timestep = 1.0 / (config.control_hz * config.substeps)
     spec.option.solver = _SOLVERS[config.solver]
     spec.option.iterations = config.iterations

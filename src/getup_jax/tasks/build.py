@@ -5,11 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 
+import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from getup_jax.config import Config, ConfigError
+from getup_jax.config import Config, ConfigError, TerrainConfig
 from getup_jax.motion.clips import GetUp
 from getup_jax.motion.library import load_motions
 from getup_jax.nets.prior import PosePrior
@@ -18,10 +19,12 @@ from getup_jax.nets.prior_data import make_pose_set
 from getup_jax.paths import asset_path, cache_dir
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.engine import make_engine
-from getup_jax.physics.terrain import Terrain
+from getup_jax.physics.terrain import Ground, Terrain
+from getup_jax.physics.terrain_map import make_terrain
 from getup_jax.tasks.getup import GetUpTask, World
 from getup_jax.tasks.observation import Observer
-from getup_jax.tasks.reset_pool import build_pool
+from getup_jax.tasks.region_pool import Site, build_region_pool
+from getup_jax.tasks.reset_pool import FlatStarts, build_pool
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -30,7 +33,7 @@ class BuiltTask:
 
     environment: GetUpTask
     world: World
-    prior: PosePrior
+    prior: PosePrior | None  # None: switched off by `prior: null`
     getups: tuple[GetUp, ...]  # the styles, in the order of the world's axis G
 
 
@@ -51,7 +54,9 @@ def build_task(
     if not getups:
         raise ConfigError(f"motion.source: no get-ups found in {config.motion.source}")
     log(f"motions: {len(getups)} get-ups, {len(library.poses)} poses")
-    if prior is None:
+    if config.prior is None:
+        log("no pose prior: the policy's actions are the servo targets")
+    elif prior is None:
         poses = make_pose_set(library.poses, character, mirrored=config.motion.mirror)
         prior, _ = cached_prior(
             poses, config.prior, cache_dir() / "prior", log, shipped=asset_path("priors")
@@ -66,27 +71,37 @@ def assemble(
     config: Config,
     character: CharacterSpec,
     getups: Sequence[GetUp],
-    prior: PosePrior,
+    prior: PosePrior | None,
     log: Callable[[str], None],
 ) -> BuiltTask:
-    """The task from its finished parts."""
-    engine = make_engine(character, config.physics)
+    """The task from its finished parts; `character` stands on a plane."""
+    site = None if config.terrain is None else _site(config, config.terrain)
+    on_ground = character if site is None else site.character
+    engine = make_engine(on_ground, config.physics)
     log(f"engine: {engine.name}")
-    action_size = prior.latent_size + character.num_joints
+    latent_size = 0 if prior is None else prior.latent_size
+    action_size = latent_size + character.num_joints
     task = GetUpTask(
         engine=engine,
-        character=character,
+        character=on_ground,
         observer=Observer.of(character, len(config.task.lookahead_s), action_size),
         config=config.task,
-        latent_size=prior.latent_size,
+        latent_size=latent_size,
+        terrain=config.terrain,
     )
-    pool = build_pool(getups, character, engine, config.task, config.seed)
+    if site is None:
+        terrain: Ground = Terrain.flat()
+        pool = build_pool(getups, character, engine, config.task, config.seed)
+    else:
+        terrain = jax.tree.map(jnp.asarray, site.ground.field())
+        flat = FlatStarts(getups, character, config.task, config.seed)
+        pool = build_region_pool(getups, flat, site, engine, config.task, log)
     log(f"start states: {len(pool.time)}")
     margin = config.task.target_margin_rad
     world = World(
         prior=prior,
         pool=pool,
-        terrain=Terrain.flat(),
+        terrain=terrain,
         points=jnp.asarray(np.stack([g.points for g in getups]), jnp.float32),
         duration=jnp.asarray([g.duration for g in getups], jnp.float32),
         neutral_rotation=_neutral_rotation(character, task.observer),
@@ -94,6 +109,11 @@ def assemble(
         target_upper=jnp.asarray(character.joint_upper + margin, jnp.float32),
     )
     return BuiltTask(environment=task, world=world, prior=prior, getups=tuple(getups))
+
+
+def _site(config: Config, terrain: TerrainConfig) -> Site:
+    ground = make_terrain(terrain)
+    return Site(terrain, ground, load_character(config.physics, ground))
 
 
 def _neutral_rotation(character: CharacterSpec, observer: Observer) -> jnp.ndarray:

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from getup_jax.tasks.curriculum import Curriculum
 from getup_jax.types import PhysicsState
 
 # kinds of start, in the order of the pool's table
@@ -50,7 +51,11 @@ class EpisodeState:
     head_steps: jax.Array  # [B] int32, steps in a row with the head on the floor
     record: Record
     key: jax.Array
-    focus: jax.Array | None = None  # [3, G, bins] success of the batch's starts; see focus.py
+    # [3 R, G, bins] success of the batch's starts; see focus.py
+    focus: jax.Array | None = None
+    # Irregular ground only; None on a flat plane.
+    region: jax.Array | None = None  # [B] int32, where the episode started
+    curriculum: Curriculum | None = None  # of the whole batch
 
 
 def update_record(

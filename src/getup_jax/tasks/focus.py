@@ -1,9 +1,10 @@
 """Starts at the frontier of what the policy can do are drawn more often than the others.
 
-Success is followed in cells: kind of start x style x part of the curve at which it starts. At the
-frontier a start sometimes succeeds, or it fails and the next part of the curve is solved (reverse
-curriculum, Florensa et al. 2017). A solved episode is several times as long as one that fails, so
-that with even draws most samples would come from what needs no more practice.
+Success is followed in cells: place x style x part of the curve at which it starts, where a place is
+a kind of start in a region (the kind alone on a flat plane). At the frontier a start sometimes
+succeeds, or it fails and the next part of the curve is solved (reverse curriculum, Florensa et al.
+2017). A solved episode is several times as long as one that fails, so that with even draws most
+samples would come from what needs no more practice.
 """
 
 from __future__ import annotations
@@ -19,9 +20,14 @@ RATE = 0.1  # share of an episode's result in its cell's running mean
 
 
 def first(pool: Pool) -> jax.Array:
-    """Running success [3, G, BINS] before any episode: none."""
-    kinds, styles, _ = pool.table.shape
-    return jnp.zeros((kinds, styles, BINS), jnp.float32)
+    """Running success [3 R, G, BINS] before any episode: none."""
+    kinds, regions, styles, _ = pool.table.shape
+    return jnp.zeros((kinds * regions, styles, BINS), jnp.float32)
+
+
+def place_of(pool: Pool, kind: jax.Array, region: jax.Array | None) -> jax.Array:
+    """Place [B] int32 of starts of the kinds [B] in the regions [B]; None: there is one region."""
+    return kind if region is None else kind * pool.table.shape[1] + region
 
 
 def bin_of(begin: jax.Array) -> jax.Array:
@@ -30,39 +36,50 @@ def bin_of(begin: jax.Array) -> jax.Array:
 
 
 def weights(learned: jax.Array, pool: Pool, duration: jax.Array, focus: float) -> jax.Array:
-    """Weight [3, G, M] of every entry of the pool's table: 1 - focus + focus * frontier."""
-    part = bin_of(pool.time[pool.table] / duration[:, None])
-    kinds, styles, _ = part.shape
-    place = (jnp.arange(kinds)[:, None, None], jnp.arange(styles)[None, :, None], part)
-    used = jnp.zeros(learned.shape, bool).at[place].set(True)
-    return 1.0 - focus + focus * jnp.take_along_axis(frontier(learned, used), part, axis=-1)
+    """Weight [3 R, G, M] of every entry of the pool's table: 1 - focus + focus * frontier.
+
+    Zero for the styles that cannot start in a region.
+    """
+    table = pool.table.reshape(-1, *pool.table.shape[2:])
+    part = bin_of(pool.time[table] / duration[:, None])
+    places, styles, _ = part.shape
+    cell = (jnp.arange(places)[:, None, None], jnp.arange(styles)[None, :, None], part)
+    used = jnp.zeros(learned.shape, bool).at[cell].set(True)
+    near = frontier(learned, used, pool.table.shape[1])
+    weight = 1.0 - focus + focus * jnp.take_along_axis(near, part, axis=-1)
+    if pool.startable is None:
+        return weight
+    order, count = pool.startable.styles, pool.startable.count
+    startable = jnp.argsort(order, axis=-1) < count[:, None]  # [R, G]
+    return weight * jnp.tile(startable, (pool.table.shape[0], 1))[..., None]
 
 
-def frontier(learned: jax.Array, used: jax.Array) -> jax.Array:
-    """How near [3, G, BINS] (0 to 1) every cell is to the frontier; used: the pool has its starts.
+def frontier(learned: jax.Array, used: jax.Array, regions: int = 1) -> jax.Array:
+    """How near [3 R, G, BINS] (0 to 1) every cell is to the frontier; used: it has starts.
 
     The larger of 4 p (1 - p) and q - p, where p is the cell's success and q that of the next part
     of the curve that has starts. After the last part comes success itself, and after a lying start
-    what starts along the curve.
+    what starts along the curve, which only the first region has.
     """
+    first_clip = CLIP * regions
     following, near = jnp.ones(learned.shape[1:2]), []
-    for part in reversed(range(BINS)):  # of the starts along the curve
+    for part in reversed(range(BINS)):
         near.append(following)
-        following = jnp.where(used[CLIP, :, part], learned[CLIP, :, part], following)
+        here = learned[first_clip, :, part]
+        following = jnp.where(used[first_clip, :, part], here, following)
     along = jnp.stack(near[::-1], axis=-1)
-    ahead = jnp.stack(
-        [jnp.broadcast_to(following[:, None], along.shape), jnp.ones_like(along), along]
-    )
+    lying = jnp.broadcast_to(following[:, None], along.shape)
+    ahead = jnp.repeat(jnp.stack([lying, jnp.ones_like(along), along]), regions, axis=0)
     return jnp.maximum(4.0 * learned * (1.0 - learned), ahead - learned)
 
 
-def draw(weight: jax.Array, kind: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Styles [B] and rows [B] int32 of starts of the given kinds [B], in proportion to weight."""
-    kinds, _, rows = weight.shape
-    total = jnp.cumsum(weight.reshape(kinds, -1), axis=-1)
-    share = jax.random.uniform(key, kind.shape)
+def draw(weight: jax.Array, place: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Styles [B] and rows [B] int32 of starts at the given places [B], in proportion to weight."""
+    places, _, rows = weight.shape
+    total = jnp.cumsum(weight.reshape(places, -1), axis=-1)
+    share = jax.random.uniform(key, place.shape)
     entry = jnp.stack([jnp.searchsorted(t, share * t[-1], side="right") for t in total])
-    chosen = jnp.minimum(entry[kind, jnp.arange(len(kind))], total.shape[-1] - 1)
+    chosen = jnp.minimum(entry[place, jnp.arange(len(place))], total.shape[-1] - 1)
     return (chosen // rows).astype(jnp.int32), (chosen % rows).astype(jnp.int32)
 
 

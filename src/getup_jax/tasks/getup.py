@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 from flax import struct
 
-from getup_jax.config import TaskConfig
+from getup_jax.config import TaskConfig, TerrainConfig
 from getup_jax.motion import curves
 from getup_jax.nets import prior as pose_prior
 from getup_jax.nets.prior import PosePrior
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.physics.terrain import Terrain
+from getup_jax.physics.terrain import Ground
 from getup_jax.rotation import angle, conjugate, multiply, rotate
 from getup_jax.rows import replace_rows
-from getup_jax.tasks import focus, rewards
-from getup_jax.tasks.episode import EpisodeState, Record, stands, update_record, verdict
+from getup_jax.tasks import curriculum, focus, rewards
+from getup_jax.tasks.episode import (
+    CLIP,
+    LYING,
+    EpisodeState,
+    Record,
+    stands,
+    update_record,
+    verdict,
+)
 from getup_jax.tasks.observation import Observer, Posture
 from getup_jax.tasks.reset_pool import Pool
 from getup_jax.types import Engine, StepOutput, take
@@ -25,13 +34,22 @@ from getup_jax.types import Engine, StepOutput, take
 _RESET_CHUNK = 32  # episodes that start anew at once; a step rarely ends more of some hundred
 
 
+class _Draw(NamedTuple):
+    """What B episodes start from; int32."""
+
+    getup: jax.Array  # [B]
+    kind: jax.Array  # [B]
+    row: jax.Array  # [B] of the pool
+    region: jax.Array | None = None  # [B]; None on a flat plane
+
+
 @struct.dataclass
 class World:
     """Every array that the task reads and training does not change."""
 
-    prior: PosePrior
+    prior: PosePrior | None  # None: the action is the pose
     pool: Pool
-    terrain: Terrain
+    terrain: Ground
     points: jax.Array  # [G, 9, 3] control points of the styles
     duration: jax.Array  # [G] s
     neutral_rotation: jax.Array  # [L - 1, 4] joint rotations of the neutral pose
@@ -47,7 +65,8 @@ class GetUpTask:
     character: CharacterSpec
     observer: Observer
     config: TaskConfig
-    latent_size: int
+    latent_size: int  # 0 without a pose prior
+    terrain: TerrainConfig | None = None  # None: a flat plane
 
     @property
     def observation_size(self) -> int:
@@ -68,8 +87,9 @@ class GetUpTask:
         """B fresh episodes."""
         key_start, key_state = jax.random.split(key)
         learned = focus.first(world.pool) if self.config.focus > 0 else None
-        state = self.start_random(world, key_start, num_envs, learned)
-        return state.replace(key=key_state, focus=learned)
+        progress = None if self.terrain is None else curriculum.first(self.terrain)
+        state = self.start_random(world, key_start, num_envs, learned, progress)
+        return state.replace(key=key_state, focus=learned, curriculum=progress)
 
     def step(
         self, world: World, state: EpisodeState, action: jax.Array
@@ -78,39 +98,78 @@ class GetUpTask:
         after, output = self.advance(world, state, action)
         key_next, key_reset = jax.random.split(state.key)
         learned = self._learned(world, after, output)
-        getup, kind, row = self._draw(world, key_reset, action.shape[0], learned)
+        progress, output = self._progress(after, output)
+        drawn = self._draw(world, key_reset, action.shape[0], learned, progress)
 
         def fresh(index: jax.Array) -> EpisodeState:
-            return self.start(world, getup[index], kind[index], row[index]).replace(key=None)
+            return self._begin(world, jax.tree.map(lambda x: x[index], drawn)).replace(key=None)
 
         done = output.terminated | output.truncated
-        # the key and the focus have no simulation axis, so they stay out of the rows
-        after = replace_rows(after.replace(key=None, focus=None), done, fresh, _RESET_CHUNK)
-        after = after.replace(key=key_next, focus=learned)
+        # what belongs to the whole batch has no simulation axis and stays out of the rows
+        rows = after.replace(key=None, focus=None, curriculum=None)
+        after = replace_rows(rows, done, fresh, _RESET_CHUNK)
+        after = after.replace(key=key_next, focus=learned, curriculum=progress)
         return after, output.replace(observation=after.observation)
 
     def start_random(
-        self, world: World, key: jax.Array, num_envs: int, learned: jax.Array | None = None
+        self,
+        world: World,
+        key: jax.Array,
+        num_envs: int,
+        learned: jax.Array | None = None,
+        progress: curriculum.Curriculum | None = None,
     ) -> EpisodeState:
-        """Episodes with a random style and kind of start; `learned` is the state's focus."""
-        return self.start(world, *self._draw(world, key, num_envs, learned))
+        """Episodes with a random style and kind of start, in the regions that are open.
+
+        learned and progress are the state's focus and curriculum.
+        """
+        return self._begin(world, self._draw(world, key, num_envs, learned, progress))
+
+    def _begin(self, world: World, drawn: _Draw) -> EpisodeState:
+        return self.start(world, drawn.getup, drawn.kind, drawn.row, region=drawn.region)
+
+    def _progress(
+        self, state: EpisodeState, output: StepOutput
+    ) -> tuple[curriculum.Curriculum | None, StepOutput]:
+        """The curriculum after a step, and the step's output with its metrics."""
+        if self.terrain is None or state.curriculum is None or state.region is None:
+            return None, output
+        success = output.episode["success"] == 1.0
+        progress = curriculum.advance(state.curriculum, self.terrain, success, state.region)
+        opened = jnp.full(len(success), progress.opened, jnp.float32)
+        return progress, output.replace(metrics=output.metrics | {"regions_open": opened})
 
     def _draw(
-        self, world: World, key: jax.Array, num_envs: int, learned: jax.Array | None
-    ) -> tuple[jax.Array, jax.Array, jax.Array]:
-        """Random styles [B], kinds of start [B] and rows [B] of the pool, all int32."""
+        self,
+        world: World,
+        key: jax.Array,
+        num_envs: int,
+        learned: jax.Array | None,
+        progress: curriculum.Curriculum | None,
+    ) -> _Draw:
+        """What new episodes [B] start from."""
         key_kind, key_style, key_row = jax.random.split(key, 3)
-        _, num_styles, rows = world.pool.table.shape
+        *_, num_styles, rows = world.pool.table.shape
         draw = jax.random.uniform(key_kind, (num_envs,))
         stand, clip = self.config.stand_start, self.config.clip_start
         kind = jnp.where(draw < stand, 1, jnp.where(draw < stand + clip, 2, 0)).astype(jnp.int32)
+        region = None
+        if progress is not None:
+            region = curriculum.draw_region(progress, jax.random.fold_in(key, 0), num_envs)
+            # only the flat region has starts along a clip
+            kind = jnp.where((region > 0) & (kind == CLIP), LYING, kind)
         if learned is not None:
             weight = focus.weights(learned, world.pool, world.duration, self.config.focus)
-            getup, row = focus.draw(weight, kind, key_row)
-            return getup, kind, row
-        getup = jax.random.randint(key_style, (num_envs,), 0, num_styles)
+            getup, row = focus.draw(weight, focus.place_of(world.pool, kind, region), key_row)
+            return _Draw(getup, kind, row, region)
+        startable = world.pool.startable
+        if region is None or startable is None:
+            getup = jax.random.randint(key_style, (num_envs,), 0, num_styles)
+        else:
+            place = jax.random.randint(key_style, (num_envs,), 0, startable.count[region])
+            getup = startable.styles[region, place]
         row = jax.random.randint(key_row, (num_envs,), 0, rows)
-        return getup, kind, row
+        return _Draw(getup, kind, row, region)
 
     def _learned(self, world: World, state: EpisodeState, output: StepOutput) -> jax.Array | None:
         """The focus after the episodes that end with this step."""
@@ -118,7 +177,8 @@ class GetUpTask:
             return None
         steps = state.record.rise_steps + state.record.stand_steps
         begin = (state.time - steps * self.engine.control_dt) / state.duration
-        cell = (state.kind, state.getup, focus.bin_of(begin))
+        place = focus.place_of(world.pool, state.kind, state.region)
+        cell = (place, state.getup, focus.bin_of(begin))
         success = output.truncated & stands(state.record)
         return focus.update(state.focus, cell, output.terminated | output.truncated, success)
 
@@ -129,9 +189,13 @@ class GetUpTask:
         kind: jax.Array,
         row: jax.Array,
         duration_scale: jax.Array | float = 1.0,
+        region: jax.Array | None = None,
     ) -> EpisodeState:
-        """Episodes of the given styles [B], kinds of start [B] and rows [B] of the pool."""
-        index = world.pool.table[kind, getup, row]
+        """Episodes of the given styles [B], kinds of start [B] and rows [B] of the pool.
+
+        region [B]: where on irregular ground; None is the first one, as on a flat plane.
+        """
+        index = world.pool.table[kind, 0 if region is None else region, getup, row]
         physics = take(world.pool.physics, index)
         size = len(getup)
         state = EpisodeState(
@@ -146,12 +210,11 @@ class GetUpTask:
             head_steps=jnp.zeros(size, jnp.int32),
             record=Record.empty(size),
             key=jnp.zeros(2, jnp.uint32),
+            region=self._region_of(region, getup),
         )
         # The filter keeps most of the last action, so the first target must be the start pose.
         angles = physics.kinematics.qpos[:, 7:]
-        latent = pose_prior.encode_action(world.prior, angles, self.targets(world, state)[:, 0])
-        action = jnp.concatenate([latent, jnp.zeros_like(angles)], axis=-1)
-        state = state.replace(action=action)
+        state = state.replace(action=self._action_of(world, state, angles))
         return state.replace(observation=self._observe(world, state, self._posture(world, state)))
 
     def advance(
@@ -185,17 +248,43 @@ class GetUpTask:
             terminated=terminated,
             truncated=truncated,
             metrics=metrics,
-            episode=verdict(state, truncated, self._full_steps(state)),
+            episode=self._verdict(state, truncated),
         )
         return state, output
 
+    def _verdict(self, state: EpisodeState, truncated: jax.Array) -> dict[str, jax.Array]:
+        episode = verdict(state, truncated, self._full_steps(state))
+        if state.region is None:
+            return episode
+        return episode | curriculum.by_region(episode, state.region)
+
     def servo_target(self, world: World, state: EpisodeState, filtered: jax.Array) -> jax.Array:
         """Hinge targets [B, J]: q = decoder(z, c) + dq [P 3.4], c the curve values now."""
-        condition = self.targets(world, state)[:, 0]
         latent, offset = jnp.split(filtered, [self.latent_size], axis=-1)
-        pose = pose_prior.decode_action(world.prior, latent, condition)
+        if world.prior is None:
+            pose = self._neutral()
+        else:
+            condition = self.targets(world, state)[:, 0]
+            pose = pose_prior.decode_action(world.prior, latent, condition)
         target = pose + self.config.offset_scale * offset
         return jnp.clip(target, world.target_lower, world.target_upper)
+
+    def _action_of(self, world: World, state: EpisodeState, angles: jax.Array) -> jax.Array:
+        """The action [B, A] whose servo target is the pose angles [B, J], as near as it gets."""
+        if world.prior is None:
+            return (angles - self._neutral()) / self.config.offset_scale
+        latent = pose_prior.encode_action(world.prior, angles, self.targets(world, state)[:, 0])
+        return jnp.concatenate([latent, jnp.zeros_like(angles)], axis=-1)
+
+    def _neutral(self) -> jax.Array:
+        """Hinge angles [J] of the neutral pose."""
+        return jnp.asarray(self.character.neutral_qpos[7:], jnp.float32)
+
+    def _region_of(self, region: jax.Array | None, getup: jax.Array) -> jax.Array | None:
+        """The state's region [B]: None on a flat plane, the first one where none is given."""
+        if self.terrain is None:
+            return None
+        return jnp.zeros_like(getup) if region is None else region
 
     def targets(self, world: World, state: EpisodeState) -> jax.Array:
         """Curve values [B, n, 3] at the look-ahead times; the first one is now."""
@@ -225,6 +314,8 @@ class GetUpTask:
             "posture": rewards.posture(joint_error, alpha),
         }
         terms["task"] = rewards.task(terms)
+        if world.prior is None:  # nothing that offsets could be unnatural to [P 6.4]
+            return terms | {"total": terms["task"]}
         terms["natural"] = rewards.natural(offset, self.config.offset_limit_rad)
         terms["total"] = terms["task"] * terms["natural"]
         return terms
@@ -254,7 +345,7 @@ class GetUpTask:
         centre = kinematics.link_position[:, link] + rotate(
             kinematics.link_quaternion[:, link], jnp.asarray(offset, jnp.float32)
         )
-        return centre[:, 2] - radius - world.terrain.height(centre[:, :2])
+        return world.terrain.clearance(centre, radius)
 
     def _record(
         self,

@@ -12,7 +12,7 @@ from flax import struct
 from getup_jax import rotation
 from getup_jax.motion.features import FeatureLinks, features
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.physics.terrain import Terrain
+from getup_jax.physics.terrain import Ground
 from getup_jax.types import Kinematics
 
 GRID_POINTS = 5  # a side of the height map
@@ -66,7 +66,7 @@ class Observer:
         ends = np.cumsum([size for _, size in self.table])
         return {name: slice(end - size, end) for (name, size), end in zip(self.table, ends)}  # noqa: B905
 
-    def posture(self, kinematics: Kinematics, terrain: Terrain) -> Posture:
+    def posture(self, kinematics: Kinematics, terrain: Ground) -> Posture:
         """Everything that the observation and the rewards take from a physics state."""
         root_position = kinematics.link_position[:, :1]
         to_heading = rotation.conjugate(rotation.heading(kinematics.link_quaternion[:, :1]))
@@ -98,7 +98,7 @@ class Observer:
         flat = [blocks[name].reshape(len(action), size) for name, size in self.table]
         return jnp.concatenate(flat, axis=-1)
 
-    def _ground(self, root: jax.Array, to_world: jax.Array, terrain: Terrain) -> jax.Array:
+    def _ground(self, root: jax.Array, to_world: jax.Array, terrain: Ground) -> jax.Array:
         """Ground height [B, 25] on the heading-aligned grid around the root [B, 3]."""
         half = GRID_STEP_M * (GRID_POINTS - 1) / 2
         steps = jnp.linspace(half, -half, GRID_POINTS)

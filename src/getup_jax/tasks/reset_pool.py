@@ -17,7 +17,7 @@ from getup_jax.motion.features import FeatureLinks, features
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.settle import lift_to_ground, settle
 from getup_jax.tasks.clip_starts import ClipFrames, velocities
-from getup_jax.tasks.episode import CLIP, STANDING
+from getup_jax.tasks.episode import CLIP, LYING, STANDING
 from getup_jax.types import Engine, PhysicsState
 
 _DROP_M = 0.01  # lying poses are dropped from this height
@@ -27,12 +27,21 @@ _Start = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @struct.dataclass
+class Startable:
+    """The styles that have lying starts in each region of irregular ground."""
+
+    styles: jax.Array  # [R, G] int32, first those that can start there, then the others
+    count: jax.Array  # [R] int32, how many can
+
+
+@struct.dataclass
 class Pool:
     """P start states and which of them belong to which style."""
 
     physics: PhysicsState  # [P] rows
     time: jax.Array  # [P] s since the curve's start, for a duration of 1 x T
-    table: jax.Array  # [3, G, M] int32 rows of every kind of start and style
+    table: jax.Array  # [3, R, G, M] int32 rows of every kind of start, region and style
+    startable: Startable | None = None  # None, a flat plane: every style can start everywhere
 
 
 def build_pool(
@@ -42,26 +51,53 @@ def build_pool(
 
     A kind with no share still gets one row a style, so that the table has one form.
     """
-    shares = kind_shares(config)
-    rows = max(1, config.pool_size // max(1, len(getups) * sum(s > 0 for s in shares)))
-    counts = [rows if share > 0 else 1 for share in shares]
-    poses = [g.clip.qpos[0] for g in getups if g.clip is not None]
-    frames = ClipFrames.of(getups, character) if config.clip_start > 0 else None
-    make = _StartMaker(character, config, np.random.default_rng(seed), poses, frames)
-    starts, table, offset = [], np.zeros((3, len(getups), rows), np.int32), 0
-    for kind, count in enumerate(counts):
-        for index, getup in enumerate(getups):
-            starts.append(make.start(kind, getup, count))
-            table[kind, index] = offset + np.arange(rows) % count
-            offset += count
-    qpos, qvel, time = (np.concatenate(part) for part in zip(*starts, strict=True))
-    lying = np.repeat([True, False, False], [len(getups) * count for count in counts])
-    qpos[lying] = lift_to_ground(character, qpos[lying], _DROP_M)
+    kinds = sum(share > 0 for share in kind_shares(config))
+    rows = max(1, config.pool_size // max(1, len(getups) * kinds))
+    qpos, qvel, time, table = FlatStarts(getups, character, config, seed).make(rows)
+    lying = np.unique(table[LYING])
     qpos[lying], qvel[lying] = settle(character, qpos[lying], config.settle_s)
-    qpos[~lying] = lift_to_ground(character, qpos[~lying], -_SINK_M)
     physics = engine.place(qpos, qvel)
-    _check_finite(physics, qpos)
-    return Pool(physics=physics, time=jnp.asarray(time, jnp.float32), table=jnp.asarray(table))
+    check_finite(physics, qpos)
+    return Pool(
+        physics=physics,
+        time=jnp.asarray(time, jnp.float32),
+        table=jnp.asarray(table[:, None]),
+    )
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FlatStarts:
+    """Start states on the flat plane, not settled yet."""
+
+    getups: Sequence[GetUp]
+    character: CharacterSpec
+    config: TaskConfig
+    seed: int
+
+    def make(self, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """qpos [P, 7 + J], qvel [P, 6 + J], time [P] and the table [3, G, rows] of their rows.
+
+        Lying starts hang just above the ground; the caller lets them settle.
+        """
+        counts = [rows if share > 0 else 1 for share in kind_shares(self.config)]
+        poses = [g.clip.qpos[0] for g in self.getups if g.clip is not None]
+        rng = np.random.default_rng(self.seed)
+        frames = None
+        if self.config.clip_start > 0:
+            frames = ClipFrames.of(self.getups, self.character)
+        make = _StartMaker(self.character, self.config, rng, poses, frames)
+        starts, table, offset = [], np.zeros((3, len(self.getups), rows), np.int32), 0
+        for kind, count in enumerate(counts):
+            for index, getup in enumerate(self.getups):
+                starts.append(make.start(kind, getup, count))
+                table[kind, index] = offset + np.arange(rows) % count
+                offset += count
+        qpos, qvel, time = (np.concatenate(part) for part in zip(*starts, strict=True))
+        lying = np.unique(table[LYING])
+        standing = np.arange(len(lying), len(qpos))
+        qpos[lying] = lift_to_ground(self.character, qpos[lying], _DROP_M)
+        qpos[standing] = lift_to_ground(self.character, qpos[standing], -_SINK_M)
+        return qpos, qvel, time, table
 
 
 def kind_shares(config: TaskConfig) -> tuple[float, float, float]:
@@ -139,7 +175,8 @@ def angle_gap(qpos: np.ndarray, getup: GetUp, character: CharacterSpec) -> float
     return float(np.abs(value[1:] - getup.points[0, 1:]).max())
 
 
-def _check_finite(physics: PhysicsState, qpos: np.ndarray) -> None:
+def check_finite(physics: PhysicsState, qpos: np.ndarray) -> None:
+    """Raise ConfigError if the engine cannot have the start states qpos [P, 7 + J]."""
     finite = np.asarray(physics.kinematics.finite)
     if not finite.all():
         raise ConfigError(

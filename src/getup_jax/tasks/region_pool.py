@@ -1,0 +1,186 @@
+"""The pool of start states on irregular ground, with one part for every region."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from getup_jax.config import ConfigError, TaskConfig, TerrainConfig
+from getup_jax.motion.clips import GetUp
+from getup_jax.nets.prior_data import pose_conditions
+from getup_jax.paths import cache_dir
+from getup_jax.physics.character import CharacterSpec
+from getup_jax.physics.settle import settle
+from getup_jax.physics.terrain_map import REGIONS, TerrainMap
+from getup_jax.tasks.episode import CLIP, LYING, STANDING
+from getup_jax.tasks.falls import Starts, fall
+from getup_jax.tasks.reset_pool import FlatStarts, Pool, Startable, check_finite, kind_shares
+from getup_jax.tasks.stances import stand
+from getup_jax.tasks.start_cache import Request, cached_starts
+from getup_jax.types import Engine, PhysicsState
+
+_PLACE_CHUNK = 2048  # states that the engine makes at once: the native one keeps memory for each
+
+Log = Callable[[str], None]
+_Part = tuple[np.ndarray, np.ndarray, np.ndarray]  # qpos [n, 7 + J], qvel [n, 6 + J], time [n]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Site:
+    """Irregular ground, its config, and the character on it."""
+
+    config: TerrainConfig
+    ground: TerrainMap
+    character: CharacterSpec  # with the ground in its model
+
+
+def build_region_pool(
+    getups: Sequence[GetUp],
+    flat: FlatStarts,
+    site: Site,
+    engine: Engine,
+    config: TaskConfig,
+    log: Log,
+) -> Pool:
+    """The start states of all regions.
+
+    The flat region has those of the flat plane at random places. In the others a style starts
+    from rag-dolls that fell so that their torso angles fit it, or standing; it has no starts along
+    its clip, and one that nothing fits is left out of the region.
+    """
+    irregular = _irregular_starts(site, config, log)
+    fits = _fits(getups, irregular[LYING], site.character, config)
+    rows, rng = _rows(config, len(getups)), np.random.default_rng(flat.seed)
+    table = np.zeros((3, len(REGIONS), len(getups), rows), np.int32)
+    parts = [_on_the_flat(flat, site, table, rng)]
+    startable = np.ones((len(REGIONS), len(getups)), bool)
+    for region in range(1, len(REGIONS)):
+        own = {kind: starts.region == region for kind, starts in irregular.items()}
+        startable[region] = fits[own[LYING]].any(axis=0)
+        _check_region(startable[region], region, getups, config, log)
+        for kind in (LYING, STANDING):
+            used = np.zeros(len(own[kind]), int)
+            for style, getup in enumerate(getups):
+                fair = own[kind] & fits[:, style] if kind == LYING else own[kind]
+                # a style that cannot start here is never drawn, but its rows must hold something
+                index = _least_used(fair if fair.any() else own[kind], used, rows, rng)
+                time = np.full(rows, getup.duration if kind == STANDING else 0.0)
+                table[kind, region, style] = sum(len(p[2]) for p in parts) + np.arange(rows)
+                parts.append((irregular[kind].qpos[index], irregular[kind].qvel[index], time))
+        table[CLIP, region] = table[LYING, region]
+    order = np.argsort(~startable, axis=1, kind="stable").astype(np.int32)
+    count = startable.sum(axis=1).astype(np.int32)
+    return _pool(parts, table, Startable(jnp.asarray(order), jnp.asarray(count)), site, engine)
+
+
+def _pool(
+    parts: list[_Part], table: np.ndarray, startable: Startable, site: Site, engine: Engine
+) -> Pool:
+    qpos, qvel, time = (np.concatenate(part) for part in zip(*parts, strict=True))
+    site.ground.check_spawn(qpos[:, :2])
+    physics = place_in_chunks(engine, qpos, qvel)
+    check_finite(physics, qpos)
+    time = jnp.asarray(time, jnp.float32)
+    return Pool(physics=physics, time=time, table=jnp.asarray(table), startable=startable)
+
+
+def _least_used(
+    fair: np.ndarray, used: np.ndarray, count: int, rng: np.random.Generator
+) -> np.ndarray:
+    """`count` of the starts where fair [N], first those that fewer styles have: see used [N]."""
+    order = rng.permutation(np.flatnonzero(fair))
+    chosen = np.resize(order[np.argsort(used[order], kind="stable")], count)
+    np.add.at(used, chosen, 1)
+    return chosen
+
+
+def region_starts(pool: Pool, episodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Styles, rows and regions [N] int32 of episodes that visit all regions and styles in turn.
+
+    In a region come the styles that can start there, each with one row after the other. The same
+    pool gives the same places.
+    """
+    if pool.startable is None:
+        raise ValueError("region_starts: expected a pool of irregular ground")
+    order, count = np.asarray(pool.startable.styles), np.asarray(pool.startable.count)
+    number = np.arange(episodes)
+    region, visit = number % len(count), number // len(count)
+    style = order[region, visit % count[region]]
+    row = visit // count[region] % pool.table.shape[-1]
+    return style.astype(np.int32), row.astype(np.int32), region.astype(np.int32)
+
+
+def _rows(config: TaskConfig, styles: int) -> int:
+    """M, the rows of every kind, region and style."""
+    kinds = sum(share > 0 for share in kind_shares(config))
+    return -(-config.pool_size // (styles * kinds * len(REGIONS)))
+
+
+def _irregular_starts(site: Site, config: TaskConfig, log: Log) -> dict[int, Starts]:
+    """Lying and standing starts of the irregular regions, from the cache or made now."""
+    place, seed = cache_dir() / "starts", site.config.seed
+    standing = Request("standing", max(30, site.config.drops // 5), seed)
+
+    def drop(request: Request, log: Log) -> Starts:
+        return fall(site.character, site.ground, request.count, request.seed, log)
+
+    def rise(request: Request, log: Log) -> Starts:
+        return stand(site.character, site.ground, request.count, request.seed, log)
+
+    falls = Request("falls", site.config.drops, seed)
+    return {
+        LYING: cached_starts(falls, site.character, drop, place, log),
+        STANDING: cached_starts(standing, site.character, rise, place, log),
+    }
+
+
+def _on_the_flat(
+    flat: FlatStarts, site: Site, table: np.ndarray, rng: np.random.Generator
+) -> _Part:
+    """The flat region's starts, the first in the pool; their rows are written into the table."""
+    qpos, qvel, time, table[:, 0] = flat.make(table.shape[-1])
+    qpos[:, :2] += site.ground.draw_spawn(0, len(qpos), rng)
+    lying = np.unique(table[LYING, 0])
+    qpos[lying], qvel[lying] = settle(site.character, qpos[lying], flat.config.settle_s)
+    return qpos, qvel, time
+
+
+def _fits(
+    getups: Sequence[GetUp], starts: Starts, character: CharacterSpec, config: TaskConfig
+) -> np.ndarray:
+    """Whether a start's torso angles are near a style's first ones, [N, G] [P 5.2]."""
+    angles = pose_conditions(starts.qpos, character)[:, None, 1:]
+    first = np.stack([getup.points[0, 1:] for getup in getups])
+    return np.abs(angles - first).max(axis=-1) <= config.curve_match_rad
+
+
+def _check_region(
+    startable: np.ndarray, region: int, getups: Sequence[GetUp], config: TaskConfig, log: Log
+) -> None:
+    """Say which styles cannot start in a region; an error if none can."""
+    missing = [getup.name for getup, ok in zip(getups, startable, strict=True) if not ok]
+    if len(missing) == len(getups):
+        raise ConfigError(
+            f"terrain: no rag-doll in the region {REGIONS[region]!r} lies within "
+            f"task.curve_match_rad = {config.curve_match_rad} of the start of any get-up; raise "
+            "it, or terrain.drops"
+        )
+    if missing:
+        log(f"start states: nothing in the region {REGIONS[region]!r} fits {', '.join(missing)}")
+
+
+def place_in_chunks(engine: Engine, qpos: np.ndarray, qvel: np.ndarray) -> PhysicsState:
+    """`engine.place` of many states [P], some at a time."""
+    size = min(_PLACE_CHUNK, len(qpos))
+    parts = []
+    for first in range(0, len(qpos), size):
+        # the last chunk is filled up, so that one batch serves all of them
+        index = np.minimum(np.arange(first, first + size), len(qpos) - 1)
+        state = engine.place(qpos[index], qvel[index])
+        keep = min(size, len(qpos) - first)
+        parts.append(jax.tree.map(lambda x, keep=keep: np.asarray(x)[:keep], state))
+    return jax.tree.map(lambda *x: jnp.asarray(np.concatenate(x)), *parts)

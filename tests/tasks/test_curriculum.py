@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from getup_jax.config import TerrainConfig
+from getup_jax.tasks.curriculum import Curriculum, advance, by_region, draw_region, first
+
+CONFIG = TerrainConfig(unlock_successes=3)
+
+
+def run(state: Curriculum, config: TerrainConfig, events: list[tuple[int, int]]) -> Curriculum:
+    """One step for each (successes, region), in a batch of four."""
+    for count, region in events:
+        success = jnp.arange(4) < count
+        state = advance(state, config, success, jnp.full(4, region, jnp.int32))
+    return state
+
+
+def numbers(state: Curriculum) -> tuple[int, int, int]:
+    return int(state.opened), int(state.successes), int(state.steps)
+
+
+def test_it_begins_with_the_flat_region():
+    assert numbers(first(CONFIG)) == (1, 0, 0)
+
+
+def test_the_next_region_opens_after_enough_successes_in_the_newest():
+    state = run(first(CONFIG), CONFIG, [(2, 0)])
+    assert numbers(state) == (1, 2, 1)
+    state = run(state, CONFIG, [(1, 0)])
+    assert numbers(state) == (2, 0, 2)
+
+
+def test_successes_in_earlier_regions_do_not_count():
+    state = run(first(CONFIG), CONFIG, [(4, 0), (4, 0), (2, 1)])
+    assert numbers(state) == (2, 2, 3)
+
+
+def test_the_last_region_keeps_counting():
+    state = run(first(CONFIG), CONFIG, [(4, 0), (4, 1), (4, 2), (4, 3), (4, 3)])
+    assert numbers(state) == (4, 8, 5)
+
+
+def test_the_schedule_opens_a_region_every_so_many_samples():
+    config = TerrainConfig(curriculum="schedule", schedule_steps=10)  # 2.5 steps of a batch of 4
+    state, seen = first(config), []
+    for _ in range(12):
+        state = run(state, config, [(4, 0)])
+        seen.append(int(state.opened))
+    assert seen == [1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 4]
+
+
+def test_without_a_curriculum_all_regions_are_open():
+    config = TerrainConfig(curriculum="none")
+    state = run(first(config), config, [(4, 0)])
+    assert int(state.opened) == 4
+
+
+@pytest.mark.parametrize("opened", [1, 3, 4])
+def test_open_regions_are_visited_evenly(opened):
+    state = first(CONFIG).replace(opened=jnp.asarray(opened, jnp.int32))
+    region = jax.jit(draw_region, static_argnums=2)(state, jax.random.PRNGKey(0), 4000)
+    share = np.bincount(region, minlength=4) / 4000
+    np.testing.assert_allclose(share[:opened], 1 / opened, atol=0.03)
+    np.testing.assert_array_equal(share[opened:], 0.0)
+
+
+def test_metrics_of_a_region_are_nan_elsewhere():
+    episode = {"success": jnp.array([1.0, 0.0]), "return_rate_lying": jnp.array([0.5, 0.2])}
+    metrics = by_region(episode, jnp.array([0, 2]))
+    np.testing.assert_array_equal(metrics["success_flat"], [1.0, np.nan])
+    np.testing.assert_array_equal(metrics["success_medium"], [np.nan, 0.0])
+    np.testing.assert_allclose(metrics["return_rate_lying_medium"], [np.nan, 0.2])
+    assert np.isnan(metrics["success_hard"]).all()
+    assert len(metrics) == 8
