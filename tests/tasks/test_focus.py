@@ -95,7 +95,7 @@ def test_styles_that_cannot_start_in_a_region_have_no_weight(built):
     startable = Startable(styles=jnp.asarray([[0, 1], [1, 0]]), count=jnp.asarray([2, 1]))
     pool = pool.replace(table=table, startable=startable)
     learned = focus.first(pool).at[2 * LYING + 1, 1].set(1.0)
-    weight = np.asarray(focus.weights(learned, pool, duration, 0.5))
+    weight = np.asarray(focus.weights(learned, pool, duration, 0.0))
     assert weight.shape == (6, 2, table.shape[-1])
     np.testing.assert_array_equal(weight[2 * LYING], 1.0)
     np.testing.assert_array_equal(weight[2 * LYING + 1, 0], 0.0)
