@@ -53,10 +53,12 @@ class ClipFrames:
             at which the curve is there; None if no frame fits at any time.
         """
         time = rng.uniform(0.0, getup.duration, _TRIES)
-        target = np.asarray(curves.evaluate(jnp.asarray(getup.points), time / getup.duration))
+        target = np.asarray(
+            curves.evaluate(jnp.asarray(getup.points), jnp.asarray(time / getup.duration))
+        )
         limit = np.array([HEIGHT_MATCH_M, ANGLE_MATCH_RAD, ANGLE_MATCH_RAD])
         gap = np.abs(self.features[None] - target[:, None]) / limit
-        fits = (gap < 1.0).all(axis=-1)
+        fits: np.ndarray = (gap < 1.0).all(axis=-1)
         matched = np.flatnonzero(fits.any(axis=1))
         if not len(matched):
             return None
