@@ -71,4 +71,5 @@ def test_the_reference_cuts_of_the_config_end_upright(mocap, character):
         height, _, front = getup.points[-1]
         assert height > 1.33, getup.name
         assert abs(np.degrees(front) - 90) < 15, getup.name
-        assert getup.points[0, 0] < 0.5, getup.name
+        # one begins on its side, propped on an elbow, with the neck at 0.52 m
+        assert getup.points[0, 0] < 0.55, getup.name

@@ -1,0 +1,31 @@
+"""One policy on two engines."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from tiny_task import CONFIG, tiny_task
+
+from getup_jax.algo.learner import make_learner
+from getup_jax.config import NetworkConfig, PPOConfig
+from getup_jax.nets.mlp import OUTPUT_LAYER
+
+
+def test_a_policys_first_actions_are_the_same_on_native_and_mjx(character, built):
+    physics = dataclasses.replace(CONFIG.physics, engine="mjx")
+    other = tiny_task(character, dataclasses.replace(CONFIG, physics=physics))
+    kind, getup, row = jnp.arange(6) % 3, jnp.arange(6) % 2, jnp.arange(6) % 4
+    learner = make_learner(built.environment, NetworkConfig(), PPOConfig(), total_steps=1)
+    policy = learner.init_learner(jax.random.PRNGKey(0)).policy
+    # at first all actions are near zero; a trained policy's are not
+    output = policy.actor["params"][OUTPUT_LAYER]
+    output["kernel"] = 100.0 * output["kernel"]
+    actions = [
+        learner.act(policy, task.environment.start(task.world, getup, kind, row).observation)
+        for task in (built, other)
+    ]
+    assert np.abs(actions[0]).max() > 1.0
+    np.testing.assert_allclose(actions[0], actions[1], atol=1e-4)
