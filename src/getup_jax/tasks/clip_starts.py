@@ -58,7 +58,7 @@ class ClipFrames:
         )
         limit = np.array([HEIGHT_MATCH_M, ANGLE_MATCH_RAD, ANGLE_MATCH_RAD])
         gap = np.abs(self.features[None] - target[:, None]) / limit
-        fits: np.ndarray = (gap < 1.0).all(axis=-1)
+        fits = gap.max(axis=-1) < 1.0
         matched = np.flatnonzero(fits.any(axis=1))
         if not len(matched):
             return None
