@@ -1,4 +1,4 @@
-"""Draw every authored motion as a row of frames: docs/motions/NAME.png.
+"""Draw every authored motion as a row of frames: docs/motions/NAME.png, composite/NAME.png.
 
     MUJOCO_GL=egl python docs/make_contact_sheets.py [NAME ...]
 
@@ -26,17 +26,21 @@ COLOURS = 160  # of the palette, which keeps the files small
 
 
 def main(names: list[str]) -> None:
-    """Draw the named motions, or all of them."""
-    character = load_character(PhysicsConfig())
-    files = sorted(asset_path("motions").glob("*.yaml"))
-    folder = Path(__file__).parent / "motions"
-    folder.mkdir(exist_ok=True)
+    """Draw the named motions, or all of them: the get-ups, and the loops of composite motion."""
+    for folder, character in (("", "humanoid49"), ("composite", "humanoid28")):
+        _draw(names, folder, load_character(PhysicsConfig(character=character)))
+
+
+def _draw(names: list[str], folder: str, character: CharacterSpec) -> None:
+    files = sorted(asset_path("motions", folder).glob("*.yaml"))
+    target_folder = Path(__file__).parent / "motions" / folder
+    target_folder.mkdir(parents=True, exist_ok=True)
     with mujoco.Renderer(character.model, HEIGHT, WIDTH) as renderer:
         for path in files:
             if names and path.stem not in names:
                 continue
             clip = clip_from_keyframes(read_keyframes(path, character), character)
-            target = folder / f"{path.stem}.png"
+            target = target_folder / f"{path.stem}.png"
             sheet = Image.fromarray(contact_sheet(clip, character, renderer))
             sheet.quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
             print(f"{target.name}: {clip.duration:.1f} s, {target.stat().st_size / 1000:.0f} kB")

@@ -8,7 +8,7 @@ from getup_jax.motion import curves
 from getup_jax.motion.authored import clip_features, read_drawn
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.keyframes import authored_poses, load_authored, read_keyframes
-from getup_jax.motion.planting import CONTACTS, Planter, geom_bottoms
+from getup_jax.motion.planting import CONTACT_NAMES, Planter, geom_bottoms
 from getup_jax.paths import asset_path
 
 NAMES = sorted(path.stem for path in asset_path("motions").glob("*.yaml"))
@@ -87,7 +87,7 @@ def test_planted_contacts_do_not_slide(name, library, character):
         for contact in first.planted:
             path = np.stack([planter.poses(q, [contact])[contact][:3] for q in inside])
             assert np.linalg.norm(path - path[0], axis=1).max() < 0.06, (contact, first.time)
-    assert set(CONTACTS) >= {c for key in motion.keyframes for c in key.planted}
+    assert set(CONTACT_NAMES) >= {c for key in motion.keyframes for c in key.planted}
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -11,7 +11,7 @@ from getup_jax.motion.keyframes import (
     clip_from_keyframes,
     read_keyframes,
 )
-from getup_jax.motion.planting import CONTACTS, Planter, geom_bottoms
+from getup_jax.motion.planting import Planter, contacts_of, geom_bottoms
 
 GOOD = """
 name: nod
@@ -165,7 +165,7 @@ def test_planter_reaches_its_targets(character):
     for name in names:
         np.testing.assert_allclose(solved[name][:3], moved[name][:3], atol=2e-3)
     np.testing.assert_allclose(solved["foot_r"][3:], moved["foot_r"][3:], atol=0.02)
-    assert not CONTACTS["foot_r"].turns
+    assert not contacts_of(character)["foot_r"].turns
 
 
 def _foot_path(clip, character):

@@ -15,6 +15,10 @@ starts from the neutral pose, and `pose: neutral` puts every link back to it.
 
 `mirror_of: supine_quadruped_left` in place of the keyframes takes the mirror image of another
 file of the folder. `duration: 3.6` (s) stretches the times of either kind.
+
+`loop: true` closes the motion: its last keyframe takes the first one's pose at its own place and
+names neither rotation nor angles. `airborne: true` in a keyframe: from it to the next one the
+body flies freely and nothing touches the floor.
 """
 
 from __future__ import annotations
@@ -30,11 +34,11 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.planting import CONTACTS
+from getup_jax.motion.planting import CONTACT_NAMES
 from getup_jax.physics.character import CharacterSpec
 
-_TOP_KEYS = ("name", "strategy", "description", "duration", "mirror_of", "keyframes")
-_FRAME_KEYS = ("time", "note", "position", "rotation", "planted", "pose", "angles")
+_TOP_KEYS = ("name", "strategy", "description", "duration", "mirror_of", "loop", "keyframes")
+_FRAME_KEYS = ("time", "note", "position", "rotation", "planted", "airborne", "pose", "angles")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the C one is ten times as fast
 _AXES = ("flex", "abd", "twist")
 _ROUNDING_RAD = 1e-3  # a file holds tenths of a degree, so a limit may be missed by this much
@@ -46,8 +50,9 @@ class Keyframe:
 
     time: float  # s
     qpos: np.ndarray  # [7 + J]
-    planted: tuple[str, ...]  # planting.CONTACTS that stay put until the next one
+    planted: tuple[str, ...]  # planting.CONTACT_NAMES that stay put until the next one
     note: str = ""
+    airborne: bool = False  # flies freely until the next one
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -58,6 +63,7 @@ class KeyframeMotion:
     strategy: str
     keyframes: tuple[Keyframe, ...]
     description: str = ""
+    loop: bool = False  # the last pose is the first one, moved along
 
     @property
     def duration(self) -> float:
@@ -85,8 +91,25 @@ def read_keyframes(path: str | Path, character: CharacterSpec) -> KeyframeMotion
     if "duration" in content:
         duration = float(_numbers(content["duration"], 1, f"{path.name}: duration", "s")[0])
         frames = _stretched(frames, duration / frames[-1].time)
+    loop = content.get("loop", False)
+    if loop is not False:
+        frames[-1] = _closing(frames, content, path.name)
     strategy, text = content.get("strategy", ""), content.get("description", "")
-    return KeyframeMotion(path.stem, str(strategy), tuple(frames), str(text).strip())
+    return KeyframeMotion(path.stem, str(strategy), tuple(frames), str(text).strip(), bool(loop))
+
+
+def _closing(frames: Sequence[Keyframe], content: Mapping, name: str) -> Keyframe:
+    """The last keyframe of a loop: the first one's pose at the last one's place."""
+    last = (content.get("keyframes") or [{}])[-1]
+    named = [key for key in ("rotation", "angles", "pose", "airborne") if key in last]
+    if content["loop"] is not True or named:
+        raise MotionError(
+            f"{name}: loop: expected true, and a last keyframe with time and position alone, since "
+            f"its pose is the first one's; got {content['loop']!r} and {', '.join(named) or 'none'}"
+        )
+    first, end = frames[0].qpos, frames[-1].qpos
+    qpos = np.concatenate([end[:2], first[2:]])
+    return dataclasses.replace(frames[-1], qpos=qpos)
 
 
 def _listed(content: Mapping, path: Path, character: CharacterSpec) -> list[Keyframe]:
@@ -151,8 +174,14 @@ def _parse_frame(
     _set_angles(qpos, frame.get("angles") or {}, character, place)
     planted = tuple(frame.get("planted") or ())
     for contact in planted:
-        _check_name(contact, tuple(CONTACTS), f"{place}: planted")
-    return Keyframe(time, qpos, planted, str(frame.get("note", "")))
+        _check_name(contact, CONTACT_NAMES, f"{place}: planted")
+    airborne = frame.get("airborne", False)
+    if not isinstance(airborne, bool) or (airborne and planted):
+        raise MotionError(
+            f"{place}: airborne: expected true or false, and nothing planted in the air, got "
+            f"{airborne!r} and {list(planted)}"
+        )
+    return Keyframe(time, qpos, planted, str(frame.get("note", "")), airborne)
 
 
 def _set_angles(qpos: np.ndarray, angles: Any, character: CharacterSpec, place: str) -> None:

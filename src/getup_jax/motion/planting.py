@@ -26,19 +26,39 @@ class Contact:
 
 
 _SIDES = ("l", "r")
-CONTACTS: dict[str, Contact] = {
-    f"{name}_{side}": Contact(f"{link}_{side}", point, turns)
-    for side in _SIDES
-    for name, link, point, turns in (
-        ("foot", "foot", (0.055, 0.0, -0.08), False),
-        ("toes", "foot", (0.18, 0.0, -0.08), True),
-        ("heel", "foot", (-0.07, 0.0, -0.08), True),
-        ("knee", "shin", (0.0, 0.0, -0.01), True),
-        ("shin", "shin", (0.0, 0.0, -0.18), False),
-        ("hand", "hand", (0.0, 0.0, -0.08), True),
-        ("elbow", "forearm", (0.0, 0.0, 0.0), True),
-    )
-}
+_PARTS = ("foot", "toes", "heel", "knee", "shin", "hand", "elbow")
+CONTACT_NAMES = tuple(f"{part}_{side}" for side in _SIDES for part in _PARTS)
+
+
+def contacts_of(character: CharacterSpec) -> dict[str, Contact]:
+    """The contacts of a character: the sole's middle, front and back edge, and limbs' geoms."""
+    return {name: contact for side in _SIDES for name, contact in _of_side(character, side)}
+
+
+def _of_side(character: CharacterSpec, side: str) -> list[tuple[str, Contact]]:
+    model = character.model
+    foot, shin, hand = (model.geom(f"{name}_{side}") for name in ("foot", "shin", "hand"))
+    (x, y, z), (length, _, height) = foot.pos, foot.size
+    places = {
+        "foot": ("foot", (x, y, z - height), False),
+        "toes": ("foot", (x + length, y, z - height), True),
+        "heel": ("foot", (x - length, y, z - height), True),
+        "knee": ("shin", (0.0, 0.0, shin.pos[2] + shin.size[1]), True),
+        "shin": ("shin", shin.pos, False),
+        "hand": ("hand", hand.pos, True),
+        "elbow": ("forearm", (0.0, 0.0, 0.0), True),
+    }
+    return [
+        (f"{name}_{side}", Contact(f"{link}_{side}", _micrometres(point), turns))
+        for name, (link, point, turns) in places.items()
+    ]
+
+
+def _micrometres(point: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = (round(float(value), 6) for value in point)  # as a file would write them
+    return x, y, z
+
+
 _TURN_WEIGHT = 0.3  # m/rad, orientation errors against position errors
 _ITERATIONS = 5
 _TOLERANCE_M = 2e-4
@@ -53,7 +73,8 @@ class Planter:
         self._data = mujoco.MjData(self._model)
         self._cost = _motion_cost(character)
         self._lower, self._upper = character.joint_lower, character.joint_upper
-        self._bodies = {name: self._model.body(c.link).id for name, c in CONTACTS.items()}
+        self._contacts = contacts_of(character)
+        self._bodies = {name: self._model.body(c.link).id for name, c in self._contacts.items()}
 
     def poses(self, qpos: np.ndarray, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Point (3) and link rotation (3x3, flat) of each contact in a pose."""
@@ -74,6 +95,11 @@ class Planter:
             mujoco.mj_integratePos(self._model, qpos, step, 1.0)
             qpos[7:] = np.clip(qpos[7:], self._lower, self._upper)
         return qpos
+
+    def centre_of_mass(self, qpos: np.ndarray) -> np.ndarray:
+        """Centre of mass [3] (m) of a pose."""
+        self._place(qpos)
+        return self._data.subtree_com[1].copy()
 
     def rest_on_floor(self, qpos: np.ndarray) -> np.ndarray:
         """The pose moved vertically until its lowest geom touches z = 0."""
@@ -97,14 +123,14 @@ class Planter:
             mujoco.mj_jac(self._model, self._data, move, turn, point, body)
             rows.append(move)
             errors.append(target[:3] - point)
-            if not CONTACTS[name].turns:
+            if not self._contacts[name].turns:
                 rows.append(_TURN_WEIGHT * turn)
                 errors.append(_TURN_WEIGHT * _turn_error(target[3:], self._data.xmat[body]))
         return np.concatenate(rows), np.concatenate(errors)
 
     def _point(self, name: str) -> np.ndarray:
         body = self._bodies[name]
-        return self._data.xpos[body] + self._turn(name).reshape(3, 3) @ CONTACTS[name].point
+        return self._data.xpos[body] + self._turn(name).reshape(3, 3) @ self._contacts[name].point
 
     def _turn(self, name: str) -> np.ndarray:
         return self._data.xmat[self._bodies[name]].copy()
@@ -137,5 +163,6 @@ def _turn_error(target: np.ndarray, current: np.ndarray) -> np.ndarray:
 
 def _motion_cost(character: CharacterSpec) -> np.ndarray:
     """Cost of motion, [6 + J]: limbs move before the trunk, and the trunk before the root."""
-    trunk = np.array([name.startswith(("spine", "neck", "head")) for name in character.joint_names])
+    links = ("spine", "torso", "neck", "head")
+    trunk = np.array([name.startswith(links) for name in character.joint_names])
     return np.concatenate([np.full(3, 20.0), np.full(3, 20.0), np.where(trunk, 10.0, 1.0)])
