@@ -186,8 +186,14 @@ class NetworkConfig:
 
     hidden_sizes: tuple[int, ...] = (256, 256)
     activation: str = "relu"  # relu | tanh | elu | silu | relu6
+    gru_size: int = 256  # GRU in front of both, where the task observes a history of frames
+    # first std of actions that the actor gives for each state; None: ppo.action_std for all
+    initial_std: float | None = None
 
     def __post_init__(self) -> None:
+        _require(self.gru_size > 0, "network.gru_size", "more than 0", self.gru_size)
+        std = self.initial_std
+        _require(std is None or std > 0, "network.initial_std", "more than 0, or null", std)
         names = ("relu", "tanh", "elu", "silu", "relu6")
         ok = self.activation in names
         _require(ok, "network.activation", f"one of {names}", self.activation)
@@ -208,6 +214,7 @@ class PPOConfig:
     entropy_coefficient: float = 0.0
     max_gradient_norm: float = 0.5
     learning_rate: tuple[float, ...] = (1e-4, 2e-5)  # first and last stage
+    critic_rate_scale: float = 1.0  # times the learning rate, for the critic
     action_std: tuple[float, ...] = (0.6, 0.3)  # first and last stage
     stages: int = 5  # equal stages of the whole run, for both schedules
     target_clip_fraction: float | None = None  # adapt the learning rate to it; None: off
@@ -221,9 +228,76 @@ class PPOConfig:
         _require(ok, "ppo.minibatch_size", expected, self.minibatch_size)
         _require(0 <= self.discount < 1, "ppo.discount", "in [0, 1)", self.discount)
         _require(0 <= self.gae_lambda <= 1, "ppo.gae_lambda", "in [0, 1]", self.gae_lambda)
+        scale = self.critic_rate_scale
+        _require(scale > 0, "ppo.critic_rate_scale", "more than 0", scale)
         for name in ("learning_rate", "action_std"):
             ends = getattr(self, name)
             _require(len(ends) == 2, f"ppo.{name}", "two values: first and last stage", ends)
+
+
+@dataclasses.dataclass(frozen=True)
+class GroupConfig:
+    """Links that imitate clips of their own, judged by a discriminator of their own [C 4.1]."""
+
+    links: tuple[str, ...] = ()  # names of links, or of presets: upper, lower, arms, rest, full
+    clips: tuple[str, ...] = ()  # names of authored clips, or motion files
+    frame: str = "heading"  # heading: of the newest root | root: the root's own in every frame
+    history: int = 3  # n_i of equation 3; a window has 2 frames more
+    speed: tuple[float, ...] = (1.0, 1.0)  # range of the clips' pace, drawn for each window
+
+    def __post_init__(self) -> None:
+        frames = ("heading", "root")
+        _require(self.frame in frames, "composite.groups.*.frame", f"one of {frames}", self.frame)
+        ok = 0 <= self.history <= 3
+        _require(ok, "composite.groups.*.history", "0 to 3, which the actor sees", self.history)
+        ok = len(self.speed) == 2 and 0 < self.speed[0] <= self.speed[1]
+        _require(ok, "composite.groups.*.speed", "0 < slowest <= fastest", self.speed)
+
+
+@dataclasses.dataclass(frozen=True)
+class DiscriminatorConfig:
+    """One ensemble a group: a GRU over the window, dense layers, many heads [C 4.2]."""
+
+    gru_size: int = 256
+    hidden_sizes: tuple[int, ...] = (256, 128)
+    heads: int = 32  # N of equation 2
+    gradient_penalty: float = 10.0  # lambda of equation 2
+    learning_rate: float = 1e-5
+    minibatch_size: int = 256
+
+    def __post_init__(self) -> None:
+        for name in ("gru_size", "heads", "learning_rate", "minibatch_size"):
+            value = getattr(self, name)
+            _require(value > 0, f"composite.discriminator.{name}", "more than 0", value)
+        ok = self.gradient_penalty >= 0
+        key = "composite.discriminator.gradient_penalty"
+        _require(ok, key, "at least 0", self.gradient_penalty)
+
+
+@dataclasses.dataclass(frozen=True)
+class CompositeConfig:
+    """Composite motion: a critic for each group and goal [C]. It replaces the get-up task."""
+
+    groups: dict[str, GroupConfig] = field(default_factory=dict)
+    shared_links: tuple[str, ...] = ()  # links that several groups may have
+    free_links: tuple[str, ...] = ()  # links that need not be in any group
+    weights: dict[str, float] = field(default_factory=dict)  # of objectives; empty: all the same
+    multi_objective: bool = True  # False: one critic for the weighted sum of all rewards
+    discriminator: DiscriminatorConfig = field(default_factory=DiscriminatorConfig)
+    start_group: str | None = None  # episodes start along its clips; None: the last group's
+    episode_s: float = 10.0
+    end_reward: float = -1.0  # of every objective in the step that ends an episode early
+    fall_height_m: float = 0.15  # a joint centre below it, but for the feet's, is a fall
+    action_scale: float = 1.0  # of a hinge's whole range, moved by an action of 1
+
+    def __post_init__(self) -> None:
+        _require(bool(self.groups), "composite.groups", "at least one group", self.groups)
+        _require(self.episode_s > 0, "composite.episode_s", "more than 0", self.episode_s)
+        _require(self.action_scale > 0, "composite.action_scale", "more than 0", self.action_scale)
+        start = self.start_group
+        names = tuple(self.groups)
+        ok = start is None or start in names
+        _require(ok, "composite.start_group", f"one of {names}, or null", start)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -253,6 +327,7 @@ class Config:
     prior: PriorConfig | None = field(default_factory=PriorConfig)
     task: TaskConfig = field(default_factory=TaskConfig)
     terrain: TerrainConfig | None = None  # None: a flat plane
+    composite: CompositeConfig | None = None  # None: the get-up task
     network: NetworkConfig = field(default_factory=NetworkConfig)
     ppo: PPOConfig = field(default_factory=PPOConfig)
     train: TrainConfig = field(default_factory=TrainConfig)

@@ -10,13 +10,15 @@ import jax
 
 from getup_jax import checkpoint
 from getup_jax.algo.learner import make_learner
-from getup_jax.config import Config
+from getup_jax.algo.objectives import make_objectives
+from getup_jax.config import CompositeConfig, Config
 from getup_jax.loop import Job, Loop, TrainingError, num_iterations, steps_per_iteration
 from getup_jax.metrics import MetricsWriter, tensorboard_module
 from getup_jax.progress import Display, count, duration
 from getup_jax.runfolder import prepare, resume_command
 from getup_jax.stop import StopRequest
 from getup_jax.tasks.build import build_task
+from getup_jax.tasks.build_composite import build_composite
 
 __all__ = ["Job", "TrainingError", "build_job", "run"]
 
@@ -25,11 +27,26 @@ Log = Callable[[str], None]
 
 def build_job(config: Config, log: Log) -> Job:
     """The task and the learner that the settings ask for."""
+    if config.composite is not None:
+        return _composite_job(config, config.composite, log)
     task = build_task(config, log)
     learner = make_learner(
         task.environment, config.network, config.ppo, total_steps=config.train.total_steps
     )
     return Job(learner=learner, world=task.world, prior=task.prior)
+
+
+def _composite_job(config: Config, composite: CompositeConfig, log: Log) -> Job:
+    task = build_composite(config, log)
+    env = task.environment
+    learner = make_learner(
+        env,
+        config.network,
+        config.ppo,
+        total_steps=config.train.total_steps,
+        objectives=make_objectives(env, composite),
+    )
+    return Job(learner=learner, world=task.world, prior=None)
 
 
 def run(

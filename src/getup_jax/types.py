@@ -84,7 +84,11 @@ class StepOutput:
 
 
 class Environment(Protocol):
-    """A batch of B episodes with automatic resets; pure functions of their arguments."""
+    """A batch of B episodes with automatic resets; pure functions of their arguments.
+
+    An observation may start with a history of frames. The environment then has `frames`, their
+    number F and size I, and the first F * I numbers are the frames, the oldest one first.
+    """
 
     @property
     def observation_size(self) -> int:

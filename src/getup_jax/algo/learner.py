@@ -1,7 +1,7 @@
 """The learner: one iteration of PPO as a pure function of the world and the training state.
 
-    rollout -> values and GAE of each objective -> value targets (PopArt) -> epochs of minibatches
-    -> observation statistics
+    rollout -> discriminators, and their rewards (composite motion) -> values and GAE of each
+    objective -> value targets (PopArt) -> epochs of minibatches -> observation statistics
 
 The statistics move last, so that rollout, values and updates of an iteration see the same ones.
 """
@@ -20,7 +20,8 @@ from flax import struct
 from getup_jax.algo import ppo, schedule
 from getup_jax.algo.actor_critic import ActorCritic, make_actor_critic, normalized, observe
 from getup_jax.algo.estimate import estimate
-from getup_jax.algo.rollout import Rollout, rollout, summarize
+from getup_jax.algo.objectives import Objectives
+from getup_jax.algo.rollout import Rollout, Transition, rollout, summarize
 from getup_jax.algo.state import LearnerState, PolicyState, TrainState, owned
 from getup_jax.algo.update import (
     adapt_scale,
@@ -31,6 +32,8 @@ from getup_jax.algo.update import (
 from getup_jax.config import NetworkConfig, PPOConfig
 from getup_jax.nets import gaussian
 from getup_jax.types import Environment
+
+_JUDGE, _DISCRIMINATORS = 2, 3  # folded into keys, so that runs without them draw what they did
 
 
 @struct.dataclass
@@ -48,8 +51,9 @@ class Learner:
     env: Environment
     model: ActorCritic
     config: PPOConfig
-    weights: tuple[float, ...]  # [K] of the objectives, their sum is 1
+    weights: tuple[float, ...]  # [K] of the critics, their sum is 1
     total_steps: int  # samples of the whole run
+    objectives: Objectives | None = None  # None: the environment gives all rewards
 
     def init(self, world: Any, key: jax.Array) -> TrainState:
         """The state before the first iteration."""
@@ -64,7 +68,11 @@ class Learner:
 
     def init_learner(self, key: jax.Array) -> LearnerState:
         """The learner's part of `init`; needs no world, so a checkpoint's form can be had alone."""
-        return self.model.init(key, self.config)
+        learner = self.model.init(key, self.config)
+        if self.objectives is None:
+            return learner
+        states = self.objectives.init(jax.random.fold_in(key, _DISCRIMINATORS))
+        return dataclasses.replace(learner, discriminators=states)
 
     def iteration(self, world: Any, state: TrainState) -> tuple[TrainState, dict[str, jax.Array]]:
         """One iteration: T * B new samples; metrics are float32 scalars.
@@ -72,20 +80,22 @@ class Learner:
         Jit it once and donate the state: `jax.jit(learner.iteration, donate_argnums=1)`.
         """
         # Folded in, so that a run that resumes here draws what the unbroken one would have.
-        key_rollout, key_update = jax.random.split(jax.random.fold_in(state.key, state.iteration))
+        key = jax.random.fold_in(state.key, state.iteration)
+        key_rollout, key_update = jax.random.split(key)
         stage = self.stage(state)
         collected = self._collect(world, state, stage, key_rollout)
-        learner, samples, explained = estimate(
-            self.model, state.learner, collected.transition, self.config
+        learner, transition, judged = self._judge(
+            world, state.learner, collected.transition, jax.random.fold_in(key, _JUDGE)
         )
+        learner, samples, explained = estimate(self.model, learner, transition, self.config)
         improved, metrics = self._improve(learner, samples, stage, key_update)
         learner = _unless_first(learner, improved)
         policy = observe(learner.policy, collected.transition.observation)
         metrics |= {
             "ppo/explained_variance": explained,
             "ppo/learning_rate": stage.learning_rate,
-            "ppo/action_std": jnp.mean(stage.action_std),
         }
+        metrics |= judged
         state = TrainState(
             learner=dataclasses.replace(learner, policy=policy),
             environment=collected.environment,
@@ -121,11 +131,25 @@ class Learner:
         """T steps with noise around the mean action."""
 
         def policy(observation: jax.Array, key_action: jax.Array):
-            mean = self.act(state.learner.policy, observation)
-            action = gaussian.sample(key_action, mean, stage.action_std)
-            return action, gaussian.log_prob(action, mean, stage.action_std)
+            policy = state.learner.policy
+            mean, std = self.model.distribution(
+                policy.actor, normalized(policy, observation), stage.action_std
+            )
+            action = gaussian.sample(key_action, mean, std)
+            return action, gaussian.log_prob(action, mean, std)
 
         return rollout(self.env, world, state.environment, policy, key, self.config.num_steps)
+
+    def _judge(
+        self, world: Any, learner: LearnerState, transition: Transition, key: jax.Array
+    ) -> tuple[LearnerState, Transition, dict[str, jax.Array]]:
+        """The rollout with the rewards that only discriminators know."""
+        if self.objectives is None or learner.discriminators is None:
+            return learner, transition, {}
+        states, transition, metrics = self.objectives.judge(
+            world, learner.discriminators, transition, key
+        )
+        return dataclasses.replace(learner, discriminators=states), transition, metrics
 
     def _improve(
         self, learner: LearnerState, samples: ppo.Samples, stage: Stage, key: jax.Array
@@ -139,7 +163,7 @@ class Learner:
 
         (actor, critic), optimiser, metrics = run_minibatches(
             loss,
-            make_optimiser(config.max_gradient_norm, stage.learning_rate),
+            make_optimiser(config.max_gradient_norm, stage.learning_rate, config.critic_rate_scale),
             (learner.policy.actor, learner.critic),
             learner.optimiser,
             samples,
@@ -148,11 +172,11 @@ class Learner:
         scale = adapt_scale(
             learner.learning_rate_scale, metrics["ppo/clip_fraction"], config.target_clip_fraction
         )
-        learner = LearnerState(
+        learner = dataclasses.replace(
+            learner,
             policy=dataclasses.replace(learner.policy, actor=actor),
             critic=critic,
             optimiser=optimiser,
-            popart=learner.popart,
             learning_rate_scale=scale,
         )
         return learner, metrics
@@ -162,10 +186,11 @@ class Learner:
     ) -> tuple[jax.Array, dict[str, jax.Array]]:
         """PPO's loss of (actor, critic) on one minibatch, and what to log of it."""
         actor, critic = parameters
-        mean = self.model.mean(actor, samples.observation)
+        mean, std = self.model.distribution(actor, samples.observation, std)
         output = self.model.output(critic, samples.observation)
         weights = jnp.asarray(self.weights, jnp.float32)
         terms, metrics = ppo.loss_terms(mean, output, samples, std, weights, self.config.clip)
+        metrics["ppo/action_std"] = jnp.mean(std)
         value_coefficient = self.config.value_coefficient
         return ppo.total_loss(terms, value_coefficient, self.config.entropy_coefficient), metrics
 
@@ -189,6 +214,7 @@ def make_learner(
     ppo_config: PPOConfig,
     total_steps: int,
     weights: Sequence[float] | None = None,
+    objectives: Objectives | None = None,
 ) -> Learner:
     """A learner for the environment.
 
@@ -197,10 +223,14 @@ def make_learner(
         network_config: of actor and critic.
         ppo_config: see `PPOConfig`.
         total_steps: samples of the whole run, for the schedules.
-        weights: [K] of the objectives, scaled here to a sum of 1; None: all the same.
+        weights: [K] of the critics, scaled here to a sum of 1; None: those of the objectives, or
+            all the same.
+        objectives: of composite motion; None: the environment gives all rewards.
     """
     count = env.num_objectives
-    weights = [1.0] * count if weights is None else list(weights)
+    if weights is None:
+        weights = [1.0] * count if objectives is None else objectives.critic_weights
+    weights = list(weights)
     if len(weights) != count or min(weights) < 0 or sum(weights) == 0:
         raise ValueError(f"weights: expected {count} of at least 0, not all 0, got {weights}")
     return Learner(
@@ -209,4 +239,5 @@ def make_learner(
         config=ppo_config,
         weights=tuple(w / math.fsum(weights) for w in weights),
         total_steps=total_steps,
+        objectives=objectives,
     )

@@ -47,7 +47,7 @@ def loss_terms(
         mean: [N, A], the actor's on the samples' observations.
         output: [N, K], the critic's.
         samples: what the old policy did.
-        std: [A], of the old and the new policy.
+        std: [A] of the old and the new policy, or [N, A] of the new one for each sample.
         weights: [K] of the objectives, their sum is 1.
         clip: half-width of the range of ratios.
     """
@@ -56,8 +56,8 @@ def loss_terms(
     terms = LossTerms(
         policy=policy_loss(ratio, samples.advantage, weights, clip),
         value=value_loss(output, samples.target),
-        # Constant while the std is a setting: the term then moves the loss, not its gradient.
-        entropy=gaussian.entropy(std),
+        # Constant where the std is a setting: the term then moves the loss, not its gradient.
+        entropy=jnp.mean(gaussian.entropy(std)),
     )
     metrics = {
         "loss/policy": terms.policy,

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from getup_jax.algo.discriminator import DiscriminatorState
 from getup_jax.algo.normalize import Moments
 from getup_jax.algo.popart import PopArt
 
@@ -29,6 +30,8 @@ class LearnerState:
     optimiser: Any  # optax state over the actor and the critic together
     popart: PopArt | None  # [K]; None: targets in return units
     learning_rate_scale: jax.Array  # [] float32, times the scheduled rate
+    # by motion group; None: no composite motion
+    discriminators: dict[str, DiscriminatorState] | None = None
 
 
 @struct.dataclass

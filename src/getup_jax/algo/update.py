@@ -23,17 +23,27 @@ SCALE_RANGE = (0.05, 5.0)
 
 
 def make_optimiser(
-    max_gradient_norm: float, learning_rate: jax.Array | float
+    max_gradient_norm: float, learning_rate: jax.Array | float, critic_scale: float = 1.0
 ) -> optax.GradientTransformation:
     """Adam after clipping the norm of the whole gradient.
 
-    The rate is an argument of the traced step, so its state has the same form at every rate.
+    The rate is an argument of the traced step, so its state has the same form at every rate. With
+    a `critic_scale`, the parameters are (actor, critic), and the critic's rate is that many times
+    as large.
     """
-    return optax.chain(
+    adam = (
         optax.clip_by_global_norm(max_gradient_norm),
         optax.scale_by_adam(eps=ADAM_EPSILON),
         optax.scale(-learning_rate),
     )
+    if critic_scale == 1.0:
+        return optax.chain(*adam)
+    return optax.chain(*adam, optax.stateless(lambda updates, _: _scale(updates, critic_scale)))
+
+
+def _scale(updates: tuple[Any, Any], critic_scale: float) -> tuple[Any, Any]:
+    actor, critic = updates
+    return actor, jax.tree.map(lambda x: critic_scale * x, critic)
 
 
 def shuffled_minibatches(

@@ -35,9 +35,22 @@ class MLP(nn.Module):
     @nn.compact
     def __call__(self, x: jax.Array) -> jax.Array:
         """The outputs [..., output_size] for inputs x[..., I]; no activation after the last."""
-        activation = ACTIVATIONS[self.activation]
-        hidden_init = nn.initializers.orthogonal(math.sqrt(2.0))
-        for index, size in enumerate(self.hidden_sizes):
-            x = activation(nn.Dense(size, kernel_init=hidden_init, name=f"hidden_{index}")(x))
-        output_init = nn.initializers.orthogonal(self.output_scale)
-        return nn.Dense(self.output_size, kernel_init=output_init, name=OUTPUT_LAYER)(x)
+        return dense_layers(
+            x, self.hidden_sizes, self.output_size, self.activation, self.output_scale
+        )
+
+
+def dense_layers(
+    x: jax.Array,
+    hidden_sizes: tuple[int, ...],
+    output_size: int,
+    activation: str = "relu",
+    output_scale: float = 1.0,
+) -> jax.Array:
+    """The layers of an `MLP`, made inside the module that calls this."""
+    nonlinear = ACTIVATIONS[activation]
+    hidden_init = nn.initializers.orthogonal(math.sqrt(2.0))
+    for index, size in enumerate(hidden_sizes):
+        x = nonlinear(nn.Dense(size, kernel_init=hidden_init, name=f"hidden_{index}")(x))
+    output_init = nn.initializers.orthogonal(output_scale)
+    return nn.Dense(output_size, kernel_init=output_init, name=OUTPUT_LAYER)(x)

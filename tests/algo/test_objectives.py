@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from probes import Probe, make_world
+from tiny_composite import COMPOSITE, CONFIG, tiny_composite
+
+from getup_jax.algo.discriminator import Discriminator
+from getup_jax.algo.learner import Learner, make_learner
+from getup_jax.algo.objectives import Objectives, make_objectives
+from getup_jax.config import NetworkConfig, PPOConfig
+from getup_jax.physics.character import load_character
+
+PROBE_PPO = PPOConfig(num_envs=16, num_steps=8, minibatch_size=32, popart=True)
+
+
+def _objectives(separate: bool = True, weights=(1.0,), names=("goal",)) -> Objectives:
+    """Objectives without an imitation: all rewards are the environment's."""
+    return Objectives(names, weights, (), Discriminator(COMPOSITE.discriminator), 1 / 30, separate)
+
+
+def _train(learner: Learner, iterations: int = 5):
+    world = make_world(by_action=1.0, action_mean=0.5, length=3, truncates=True)
+    state = jax.jit(learner.init)(world, jax.random.key(0))
+    step = jax.jit(learner.iteration, donate_argnums=1)
+    for _ in range(iterations):
+        state, metrics = step(world, state)
+    return state, metrics
+
+
+@pytest.mark.parametrize("separate", [True, False])
+def test_one_objective_with_one_reward_is_plain_ppo_bit_for_bit(separate: bool):
+    network = NetworkConfig(hidden_sizes=(16,), activation="tanh")
+    plain = make_learner(Probe(), network, PROBE_PPO, 10_000)
+    composite = make_learner(Probe(), network, PROBE_PPO, 10_000, objectives=_objectives(separate))
+    expected, metrics = _train(plain)
+    found, same = _train(composite)
+    assert found.learner.discriminators == {}
+    found = dataclasses.replace(
+        found, learner=dataclasses.replace(found.learner, discriminators=None)
+    )
+    assert jax.tree.structure(found) == jax.tree.structure(expected)
+    for a, b in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
+        assert_array_equal(jax.random.key_data(a) if _is_key(a) else a, _plain(b))
+    assert all(same[name] == value for name, value in metrics.items() if not jnp.isnan(value))
+
+
+def test_equal_critics_equal_one():
+    """Two objectives with the same reward move the policy as one does."""
+    network = NetworkConfig(hidden_sizes=(16,), activation="tanh")
+    one = _train(make_learner(Probe(), network, PROBE_PPO, 10_000))[1]
+    objectives = _objectives(weights=(0.5, 0.5), names=("a", "b"))
+    env = Probe(scale=(1.0, 1.0))
+    two = _train(make_learner(env, network, PROBE_PPO, 10_000, objectives=objectives))[1]
+    # the critics start from other weights, so the advantages differ a little
+    assert_allclose(two["rollout/reward_a"], two["rollout/reward_b"])
+    assert_allclose(two["rollout/reward"], one["rollout/reward"], rtol=0.2)
+
+
+def _is_key(x) -> bool:
+    return jnp.issubdtype(x.dtype, jax.dtypes.prng_key)
+
+
+def _plain(x):
+    return jax.random.key_data(x) if _is_key(x) else x
+
+
+@pytest.fixture(scope="module")
+def built():
+    return tiny_composite(load_character(CONFIG.physics))
+
+
+@pytest.fixture(scope="module")
+def judged(built):
+    """A hand-made rollout of real windows, judged once."""
+    env, world = built.environment, jax.device_put(built.world)
+    objectives = make_objectives(env, COMPOSITE)
+
+    def run(key):
+        states = objectives.init(key)
+        env_state = env.init(world, key, 8)
+
+        def step(state, _):
+            state, output = env.step(world, state, jnp.full((8, 28), 0.05))
+            return state, output
+
+        _, output = jax.lax.scan(step, env_state, None, length=4)
+        transition = _transition(output)
+        return transition, *objectives.judge(world, states, transition, key)
+
+    return objectives, world, jax.jit(run)(jax.random.key(0))
+
+
+def _transition(output):
+    from getup_jax.algo.rollout import Transition
+
+    terminated = output.terminated.at[0, 0].set(True)
+    reward = jnp.where(terminated[..., None], -1.0, output.reward)
+    zeros = jnp.zeros(output.reward.shape[:2])
+    return Transition(
+        output.observation,
+        zeros,
+        zeros,
+        reward,
+        terminated,
+        output.truncated,
+        output.final_observation,
+        output.extras,
+    )
+
+
+def test_every_step_gets_the_score_of_the_trained_discriminator(judged):
+    objectives, _, (before, states, after, metrics) = judged
+    assert after.reward.shape == (4, 8, 2)
+    score = jax.jit(objectives.discriminator.score)
+    for index, group in enumerate(objectives.groups):
+        expected = score(states[group.name], before.extras[group.name])
+        expected = np.where(before.terminated, -1.0, expected)
+        assert_allclose(after.reward[..., index], expected, atol=1e-5)
+        assert_allclose(metrics[f"rollout/reward_{group.name}"], expected.mean(), atol=1e-5)
+        assert np.isfinite(metrics[f"discriminator_{group.name}/loss"])
+    assert after.reward[0, 0].tolist() == [-1.0, -1.0]
+
+
+def test_one_critic_gets_the_weighted_sum(judged):
+    objectives, _, (_, _, after, _) = judged
+    summed = dataclasses.replace(objectives, separate=False, weights=(0.25, 0.75))
+    assert summed.critic_weights == (1.0,)
+    rewards = np.asarray(after.reward)
+    found = summed._merged(after.reward)
+    assert_allclose(found[..., 0], 0.25 * rewards[..., 0] + 0.75 * rewards[..., 1], atol=1e-6)

@@ -1,0 +1,147 @@
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+from tiny_composite import CONFIG, clips, tiny_composite
+
+from getup_jax.config import ConfigError
+from getup_jax.physics.character import load_character
+from getup_jax.tasks.build_composite import assemble_composite, resampled
+from getup_jax.tasks.composite import FRAMES, LINK_STATE, observe
+
+SIZE = 16
+
+
+@pytest.fixture(scope="module")
+def character():
+    return load_character(CONFIG.physics)
+
+
+@pytest.fixture(scope="module")
+def built(character):
+    return tiny_composite(character)
+
+
+@pytest.fixture(scope="module")
+def steps(built):
+    """The jitted step, and the outputs of a second of standing."""
+    env, world = built.environment, built.world
+    step = jax.jit(env.step)
+    state = jax.jit(env.init, static_argnums=2)(world, jax.random.key(0), SIZE)
+    outputs, states = [], [state]
+    for _ in range(30):
+        state, output = step(world, state, jnp.zeros((SIZE, env.action_size)))
+        outputs.append(output)
+        states.append(state)
+    return step, states, outputs
+
+
+def test_starts_lie_on_the_clip_with_the_frames_before(built, steps):
+    _, states, _ = steps
+    first = states[0].history
+    assert first.shape == (SIZE, FRAMES + 1, 15, LINK_STATE)
+    assert_allclose(first[:, -1, 0, :3], states[0].physics.kinematics.link_position[:, 0])
+    # velocities belong to the positions: frame by frame the root's height changes by v dt
+    height, rate = np.asarray(first[:, :, 0, 2]), np.asarray(first[:, :, 0, 9])
+    assert_allclose(np.diff(height, axis=1), rate[:, :-1] / 30, atol=1e-3)
+
+
+def test_history_moves_on_by_one_frame(steps):
+    _, states, outputs = steps
+    ended = np.asarray(outputs[0].terminated | outputs[0].truncated)
+    kept, before, after = ~ended, states[0].history, states[1].history
+    assert kept.any()
+    assert_allclose(after[kept][:, :-1], before[kept][:, 1:])
+    assert_allclose(after[:, -1, :, :3], states[1].physics.kinematics.link_position, atol=1e-6)
+
+
+def test_observation_is_that_of_the_last_frames(built, steps):
+    _, states, _ = steps
+    state = states[5]
+    assert state.observation.shape == (SIZE, built.environment.observation_size)
+    assert_allclose(state.observation, jax.jit(observe)(state.history[:, 1:]), atol=1e-6)
+    frames = state.observation.reshape(SIZE, FRAMES, 15, LINK_STATE)
+    assert_allclose(frames[:, -1, 0, :2], 0.0, atol=1e-6)  # below the newest root
+    assert_allclose(frames[:, -1, 0, 2], state.history[:, -1, 0, 2], atol=1e-6)
+
+
+def test_observation_does_not_see_place_and_heading():
+    rng = np.random.default_rng(0)
+    history = rng.normal(size=(3, FRAMES, 15, LINK_STATE))
+    turns = Rotation.random(3 * FRAMES * 15, random_state=1)
+    history[..., 3:7] = turns.as_quat(scalar_first=True).reshape(3, FRAMES, 15, 4)
+    yaw = Rotation.from_rotvec([0.0, 0.0, -1.3])
+    moved = history.copy()
+    for part in (slice(0, 3), slice(7, 10), slice(10, 13)):
+        moved[..., part] = yaw.apply(history[..., part].reshape(-1, 3)).reshape(3, FRAMES, 15, 3)
+    moved[..., :3] += [4.0, -7.0, 0.0]
+    moved[..., 3:7] = (yaw * turns).as_quat(scalar_first=True).reshape(3, FRAMES, 15, 4)
+    see = jax.jit(observe)
+    assert_allclose(see(history), see(moved), atol=1e-4)
+
+
+def test_windows_are_those_of_the_groups(built, steps):
+    _, _, outputs = steps
+    for group in built.environment.groups:
+        assert outputs[0].extras[group.name].shape == (SIZE, 5, group.size)
+        assert np.isfinite(outputs[-1].extras[group.name]).all()
+
+
+def test_a_fall_ends_every_objective_with_its_reward(built, steps):
+    step, states, _ = steps
+    state = states[0]
+    for _ in range(60):  # knees to their limit: the body drops
+        action = jnp.zeros((SIZE, 28)).at[:, 18:].set(1.0)
+        state, output = step(built.world, state, action)
+        fallen = np.asarray(output.terminated)
+        assert_allclose(output.reward[fallen], -1.0)
+        assert_allclose(output.reward[~fallen], 0.0)
+        if fallen.any():
+            break
+    assert fallen.any()
+    # the new episodes start along the clip again
+    assert (np.asarray(state.step)[fallen] == 0).all()
+    assert (np.asarray(state.physics.kinematics.link_position)[fallen, 0, 2] > 0.4).all()
+    assert (np.asarray(output.final_observation) != np.asarray(output.observation))[fallen].any()
+
+
+def test_episodes_are_cut_after_their_time(built, steps):
+    _, states, _ = steps
+    env = dataclasses.replace(
+        built.environment, config=dataclasses.replace(built.environment.config, episode_s=0.1)
+    )
+    state = states[0].replace(step=jnp.arange(SIZE) % 3)
+    _, output = jax.jit(env.step)(built.world, state, jnp.zeros((SIZE, 28)))
+    ended = np.asarray(output.truncated | output.terminated)
+    assert (ended == (np.arange(SIZE) % 3 == 2)).all()
+    assert not (output.truncated & output.terminated).any()
+
+
+def test_zero_action_is_the_neutral_pose_and_one_a_whole_range(built, character):
+    world = built.world
+    assert_allclose(world.target_centre, character.neutral_qpos[7:], atol=1e-6)
+    assert_allclose(world.target_scale, character.joint_upper - character.joint_lower, rtol=1e-6)
+
+
+def test_clips_at_another_rate(character):
+    clip = clips(character)["lower"][0]
+    slow = resampled(clip, 20.0)
+    assert_allclose(slow.duration, clip.duration)
+    assert_allclose(slow.qpos[2], clip.qpos[3], atol=1e-9)
+    assert resampled(clip, 30.0) is clip
+
+
+def test_starts_must_stand(character):
+    lying = clips(character)
+    clip = lying["lower"][0]
+    qpos = clip.qpos.copy()
+    qpos[:, 2] = 0.05
+    lying["lower"] = [dataclasses.replace(clip, qpos=qpos)]
+    with pytest.raises(ConfigError, match=r"groups\.lower\.clips: every frame counts as a fall"):
+        assemble_composite(CONFIG, character, lying, lambda text: None)
