@@ -41,7 +41,7 @@ def make_optimiser(
     return optax.chain(*adam, optax.stateless(lambda updates, _: _scale(updates, critic_scale)))
 
 
-def _scale(updates: tuple[Any, Any], critic_scale: float) -> tuple[Any, Any]:
+def _scale(updates: Any, critic_scale: float) -> tuple[Any, Any]:
     actor, critic = updates
     return actor, jax.tree.map(lambda x: critic_scale * x, critic)
 

@@ -7,6 +7,7 @@ discriminators know: it gives them the windows in `StepOutput.extras`.
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -53,7 +54,7 @@ class CompositeState:
     observation: jax.Array  # [B, O]
     history: jax.Array  # [B, FRAMES + 1, L, LINK_STATE] world frame, the oldest first
     step: jax.Array  # [B] int32, steps done
-    key: jax.Array | None
+    key: Any
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
