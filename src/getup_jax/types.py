@@ -3,7 +3,7 @@
 One letter an axis, everywhere in the package:
 
     B simulations    T steps        K objectives    N samples
-    J hinge joints (= actuators)    L links, the root first    P pool rows
+    J hinge joints (= actuators)    L links, the root first    P pool rows    Q balls
 
 Units are SI: m, s, kg, N, Nm, rad. World frame: Z up. Quaternions: w x y z.
 """
@@ -29,6 +29,17 @@ class Kinematics:
     link_linear_velocity: jax.Array  # [B, L, 3] of the joint centre, world frame (m/s)
     torque: jax.Array  # [B, J] actuator torque of the last substep (Nm)
     finite: jax.Array  # [B] bool; False: the simulation failed and must be reset
+    prop_position: jax.Array | None = None  # [B, Q, 3] balls, world (m); None: there are none
+    prop_velocity: jax.Array | None = None  # [B, Q, 3] world (m/s)
+
+
+@struct.dataclass
+class PropCommand:
+    """Balls to put somewhere before a control step, as a hand does that holds or throws one."""
+
+    mask: jax.Array  # [B, Q] bool, which ones
+    position: jax.Array  # [B, Q, 3] world (m)
+    velocity: jax.Array  # [B, Q, 3] world (m/s)
 
 
 @struct.dataclass

@@ -1,0 +1,93 @@
+"""Aiming: point the right forearm along a direction [C 6.4, reward of its release]."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+
+from getup_jax.physics.props import Ball
+from getup_jax.tasks.goals.goal import (
+    GoalOutput,
+    Marker,
+    heading_frame,
+    never,
+    no_event,
+    root_heading,
+    uniform,
+)
+from getup_jax.types import Kinematics, PropCommand, select
+
+_SHARPNESS = 2.0
+
+
+@struct.dataclass
+class AimingState:
+    """Where to point, and for how long."""
+
+    direction: jax.Array  # [B, 3] unit vector, world
+    time_left: jax.Array  # [B] s
+
+
+@dataclasses.dataclass(frozen=True)
+class Aiming:
+    """Settings of the goal."""
+
+    control_dt: float
+    forearm: int  # link index
+    hand: int  # link index
+    yaw: float = 0.8  # rad, the largest angle of a new direction to the character's heading
+    pitch: tuple[float, float] = (-0.3, 0.4)  # rad above the horizontal
+    time: tuple[float, float] = (2.0, 4.0)  # s between changes
+
+    name: ClassVar[str] = "aiming"
+    links: ClassVar[dict[str, str]] = {"forearm": "forearm_r", "hand": "hand_r"}
+    observation_size: ClassVar[int] = 3
+    balls: ClassVar[tuple[Ball, ...]] = ()
+
+    def reset(self, key: jax.Array, kinematics: Kinematics) -> AimingState:
+        """A direction around where the character faces."""
+        key_yaw, key_pitch, key_time = jax.random.split(key, 3)
+        count = len(kinematics.finite)
+        yaw = root_heading(kinematics) + uniform(key_yaw, count, (-self.yaw, self.yaw))
+        pitch = uniform(key_pitch, count, self.pitch)
+        level = jnp.cos(pitch)
+        direction = [level * jnp.cos(yaw), level * jnp.sin(yaw), jnp.sin(pitch)]
+        return AimingState(
+            direction=jnp.stack(direction, axis=-1), time_left=uniform(key_time, count, self.time)
+        )
+
+    def step(
+        self, key: jax.Array, state: AimingState, kinematics: Kinematics
+    ) -> tuple[AimingState, GoalOutput]:
+        """Reward of the forearm's direction; a new one where the time is over."""
+        elbow = kinematics.link_position[:, self.forearm]
+        hand = kinematics.link_position[:, self.hand]
+        reward = aiming_reward(elbow, hand, state.direction)
+        state = state.replace(time_left=state.time_left - self.control_dt)
+        state = select(state.time_left <= 0.0, self.reset(key, kinematics), state)
+        return state, GoalOutput(reward, never(kinematics), no_event(kinematics))
+
+    def observe(self, state: AimingState, kinematics: Kinematics) -> jax.Array:
+        """The direction in the heading frame 3."""
+        return heading_frame(kinematics, state.direction)
+
+    def command(self, state: AimingState, kinematics: Kinematics) -> PropCommand | None:
+        """No balls."""
+        return None
+
+    def markers(self, state: AimingState, kinematics: Kinematics) -> list[Marker]:
+        """An arrow from the elbow."""
+        elbow = np.asarray(kinematics.link_position[self.forearm])
+        return [Marker(position=elbow, reach=np.asarray(state.direction), radius=0.015)]
+
+
+def aiming_reward(elbow: jax.Array, hand: jax.Array, direction: jax.Array) -> jax.Array:
+    """exp(-2 |hand - (elbow + L u)| / L) with L the forearm's length; positions [B, 3]."""
+    length = jnp.linalg.norm(hand - elbow, axis=-1)
+    gap = jnp.linalg.norm(hand - (elbow + length[:, None] * direction), axis=-1)
+    return jnp.exp(-_SHARPNESS * gap / jnp.maximum(length, 1e-6))

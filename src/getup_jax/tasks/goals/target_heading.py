@@ -1,0 +1,86 @@
+"""Target heading: go along a direction at a speed, both of which change now and then [C 6.4].
+
+The paper's appendix with the details is not public; this follows its target location.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+
+from getup_jax.physics.props import Ball
+from getup_jax.tasks.goals.goal import (
+    GoalOutput,
+    Marker,
+    floor_frame,
+    never,
+    no_event,
+    root_heading,
+    uniform,
+)
+from getup_jax.tasks.goals.speed import velocity_reward
+from getup_jax.types import Kinematics, PropCommand, select
+
+
+@struct.dataclass
+class HeadingState:
+    """What to do now, and for how long."""
+
+    direction: jax.Array  # [B, 2] unit vector on the floor
+    speed: jax.Array  # [B] m/s
+    time_left: jax.Array  # [B] s
+
+
+@dataclasses.dataclass(frozen=True)
+class TargetHeading:
+    """Settings of the goal."""
+
+    control_dt: float
+    speed: tuple[float, float] = (1.2, 1.5)  # m/s, range that targets are drawn from
+    time: tuple[float, float] = (3.0, 5.0)  # s between changes
+    turn: float = 2.0  # rad, the largest turn of a new direction off the character's heading
+
+    name: ClassVar[str] = "target_heading"
+    observation_size: ClassVar[int] = 3
+    balls: ClassVar[tuple[Ball, ...]] = ()
+
+    def reset(self, key: jax.Array, kinematics: Kinematics) -> HeadingState:
+        """A direction off the heading that the character has."""
+        key_turn, key_speed, key_time = jax.random.split(key, 3)
+        count = len(kinematics.finite)
+        yaw = root_heading(kinematics) + uniform(key_turn, count, (-self.turn, self.turn))
+        return HeadingState(
+            direction=jnp.stack([jnp.cos(yaw), jnp.sin(yaw)], axis=-1),
+            speed=uniform(key_speed, count, self.speed),
+            time_left=uniform(key_time, count, self.time),
+        )
+
+    def step(
+        self, key: jax.Array, state: HeadingState, kinematics: Kinematics
+    ) -> tuple[HeadingState, GoalOutput]:
+        """Reward of the velocity; a new direction where the time is over."""
+        velocity = kinematics.link_linear_velocity[:, 0, :2]
+        reward = velocity_reward(velocity, state.direction * state.speed[:, None])
+        state = state.replace(time_left=state.time_left - self.control_dt)
+        state = select(state.time_left <= 0.0, self.reset(key, kinematics), state)
+        return state, GoalOutput(reward, never(kinematics), no_event(kinematics))
+
+    def observe(self, state: HeadingState, kinematics: Kinematics) -> jax.Array:
+        """Direction in the heading frame 2, speed 1."""
+        direction = floor_frame(kinematics, state.direction)
+        return jnp.concatenate([direction, state.speed[:, None]], axis=-1)
+
+    def command(self, state: HeadingState, kinematics: Kinematics) -> PropCommand | None:
+        """No balls."""
+        return None
+
+    def markers(self, state: HeadingState, kinematics: Kinematics) -> list[Marker]:
+        """An arrow at the feet."""
+        root = np.asarray(kinematics.link_position[0])
+        reach = np.append(np.asarray(state.direction * state.speed), 0.0)
+        return [Marker(position=np.array([root[0], root[1], 0.05]), reach=reach, radius=0.03)]
