@@ -61,8 +61,10 @@ class Engine(Protocol):
         """States with the given qpos[P, 7 + J] and qvel[P, 6 + J]; pools are made of these."""
         ...
 
-    def step(self, state: PhysicsState, ctrl: jax.Array) -> PhysicsState:
-        """One control period with hinge targets ctrl[B, J] (rad)."""
+    def step(
+        self, state: PhysicsState, ctrl: jax.Array, balls: PropCommand | None = None
+    ) -> PhysicsState:
+        """One control period with hinge targets ctrl[B, J] (rad), balls put somewhere first."""
         ...
 
 

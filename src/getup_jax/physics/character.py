@@ -12,8 +12,9 @@ import numpy as np
 
 from getup_jax.config import ConfigError, PhysicsConfig
 from getup_jax.paths import asset_path
+from getup_jax.physics.props import Equipment, add_balls, add_racket
 from getup_jax.physics.terrain_map import TerrainMap
-from getup_jax.physics.terrain_model import replace_floor
+from getup_jax.physics.terrain_model import FLOOR, replace_floor
 
 _SOLVERS = {
     "auto": mujoco.mjtSolver.mjSOL_PGS,  # the MJX engine, which has none, takes Newton
@@ -42,6 +43,8 @@ class CharacterSpec:
     head_sphere: tuple[int, tuple[float, float, float], float]  # link, centre in it (m), radius (m)
     mirror_joint: np.ndarray  # [J] hinge on the other side
     mirror_sign: np.ndarray  # [J] sign of its angle in the mirror image
+    scene: mujoco.MjModel  # what engines simulate: the model, and balls behind it
+    ball_names: tuple[str, ...] = ()  # [Q]
 
     @property
     def num_joints(self) -> int:
@@ -68,12 +71,26 @@ class CharacterSpec:
         return np.concatenate([root, joints], axis=-1)
 
 
-def load_character(config: PhysicsConfig, ground: TerrainMap | None = None) -> CharacterSpec:
+def load_character(
+    config: PhysicsConfig,
+    ground: TerrainMap | None = None,
+    equipment: Equipment | None = None,
+) -> CharacterSpec:
     """Read the MJCF file that the config names and apply the config's physics settings.
 
-    The character stands on its file's floor, a plane, or on the given ground in place of it.
+    The character stands on its file's floor, a plane, or on the given ground in place of it,
+    with the given equipment.
     """
-    model = _compile(config, ground)
+    spec = mujoco.MjSpec.from_file(str(character_file(config.character)))
+    if ground is not None:
+        replace_floor(spec, ground)
+    balls = equipment.balls if equipment else ()
+    if equipment and equipment.racket:
+        add_racket(spec)
+    model = scene = _compile(spec, config)
+    if balls:
+        add_balls(spec, balls, FLOOR)
+        scene = _compile(spec, config)
     bodies = [model.body(i).name for i in range(1, model.nbody)]
     hinges = [i for i in range(model.njnt) if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE]
     names = tuple(model.joint(i).name for i in hinges)
@@ -91,6 +108,8 @@ def load_character(config: PhysicsConfig, ground: TerrainMap | None = None) -> C
         head_sphere=_head_sphere(model),
         mirror_joint=mirror_joint,
         mirror_sign=mirror_sign,
+        scene=scene,
+        ball_names=tuple(ball.name for ball in balls),
     )
 
 
@@ -103,16 +122,14 @@ def character_file(name: str) -> Path:
     return path
 
 
-def _compile(config: PhysicsConfig, ground: TerrainMap | None) -> mujoco.MjModel:
-    spec = mujoco.MjSpec.from_file(str(character_file(config.character)))
-    if ground is not None:
-        replace_floor(spec, ground)
+def _compile(spec: mujoco.MjSpec, config: PhysicsConfig) -> mujoco.MjModel:
     spec.option.timestep = 1.0 / (config.control_hz * config.substeps)
     spec.option.solver = _SOLVERS[config.solver]
     spec.option.iterations = config.iterations
     model = spec.compile()
-    model.dof_armature[6:] = config.armature
-    model.dof_damping[6:] = config.damping
+    hinges = slice(6, 6 + model.nu)
+    model.dof_armature[hinges] = config.armature
+    model.dof_damping[hinges] = config.damping
     model.actuator_gainprm[:, 0] *= config.gain_scale
     model.actuator_biasprm[:, 1:3] *= config.gain_scale
     model.actuator_forcerange *= config.torque_scale
@@ -140,12 +157,16 @@ def _head_sphere(model: mujoco.MjModel) -> tuple[int, tuple[float, float, float]
 
 
 def _mirror_table(names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Right axes are mirrored in the file, so only unpaired hinges flip their sign."""
+    """Right axes are mirrored in the file, so only unpaired hinges flip their sign.
+
+    A wrist that one side alone has keeps its angles.
+    """
     other = {"_l_": "_r_", "_r_": "_l_"}
     index, sign = [], []
     for name in names:
         side = next((s for s in other if s in name), None)
-        index.append(names.index(name.replace(side, other[side]) if side else name))
+        image = name.replace(side, other[side]) if side else name
+        index.append(names.index(image if image in names else name))
         sign.append(-1.0 if side is None and name.endswith(("_abd", "_twist")) else 1.0)
     return np.array(index, np.int32), np.array(sign)
 

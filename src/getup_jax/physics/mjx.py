@@ -13,12 +13,14 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import mujoco
+import numpy as np
 from flax import struct
 from mujoco import mjx
 
 from getup_jax.config import ConfigError, PhysicsConfig
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.types import Kinematics, PhysicsState
+from getup_jax.physics.props import with_balls
+from getup_jax.types import Kinematics, PhysicsState, PropCommand
 
 
 @struct.dataclass
@@ -47,7 +49,9 @@ class MjxEngine:
         self.control_dt = 1.0 / config.control_hz
         self.compiler_options = CPU_COMPILER_OPTIONS if jax.default_backend() == "cpu" else None
         self._substeps = config.substeps
-        model = copy.copy(character.model)
+        self._sizes = len(character.link_names), 7 + character.num_joints
+        model = copy.copy(character.scene)
+        self._scene = model
         if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
             model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
         self._model = _put_model(model, impl)
@@ -55,15 +59,35 @@ class MjxEngine:
 
     def place(self, qpos: Any, qvel: Any) -> PhysicsState:
         """See `Engine.place`."""
+        qpos, qvel = with_balls(np.asarray(qpos), np.asarray(qvel), self._scene)
         qpos, qvel = jnp.asarray(qpos, jnp.float32), jnp.asarray(qvel, jnp.float32)
         state = MjxState(qpos=qpos, qvel=qvel, warmstart=jnp.zeros_like(qvel))
         return _place(self, state)
 
-    def step(self, state: PhysicsState, ctrl: jax.Array) -> PhysicsState:
+    def step(
+        self, state: PhysicsState, ctrl: jax.Array, balls: PropCommand | None = None
+    ) -> PhysicsState:
         """See `Engine.step`."""
         ctrl = jnp.nan_to_num(ctrl)
+        if balls is not None:
+            state = state.replace(engine=self._put_balls(state.engine, balls))
         engine, kinematics = jax.vmap(self._step_one)(state.engine, ctrl)
         return PhysicsState(engine=engine, kinematics=kinematics)
+
+    def _put_balls(self, state: MjxState, balls: PropCommand) -> MjxState:
+        """Set the balls of the mask; they do not spin."""
+        size, at = self._sizes[1], balls.mask[..., None]
+        count = balls.mask.shape[:2]
+        qpos = state.qpos[:, size:].reshape(*count, 7)
+        qvel = state.qvel[:, size - 1 :].reshape(*count, 6)
+        qpos = qpos.at[..., :3].set(jnp.where(at, balls.position, qpos[..., :3]))
+        still = jnp.zeros_like(balls.velocity)
+        moving = jnp.concatenate([balls.velocity, still], axis=-1)
+        qvel = jnp.where(at, moving, qvel)
+        return state.replace(
+            qpos=state.qpos.at[:, size:].set(qpos.reshape(count[0], -1)),
+            qvel=state.qvel.at[:, size - 1 :].set(qvel.reshape(count[0], -1)),
+        )
 
     def _step_one(self, state: MjxState, ctrl: jax.Array) -> tuple[MjxState, Kinematics]:
         data = self._load(state)
@@ -84,7 +108,9 @@ class MjxEngine:
         """
         model = self._model
         gain, bias = model.actuator_gainprm[:, 0], model.actuator_biasprm
-        force = gain * data.ctrl + bias[:, 1] * data.qpos[7:] + bias[:, 2] * data.qvel[6:]
+        joints = self._sizes[1]
+        rates = data.qvel[6 : joints - 1]
+        force = gain * data.ctrl + bias[:, 1] * data.qpos[7:joints] + bias[:, 2] * rates
         lower, upper = model.actuator_forcerange.T
         limited = (force < lower) | (force > upper)
         ctrl = jnp.where(limited, jnp.clip(force, lower, upper) / gain, data.ctrl)
@@ -103,19 +129,23 @@ class MjxEngine:
         data = mjx.kinematics(model, data)
         data = mjx.com_pos(model, data)
         data = mjx.com_vel(model, data)
-        cvel, position = data.cvel[1:], data.xpos[1:]
+        links, joints = slice(1, 1 + self._sizes[0]), self._sizes[1]
+        cvel, position = data.cvel[links], data.xpos[links]
+        balls = data.qvel[joints - 1 :].reshape(-1, 6)
         angular = cvel[:, :3]
         arm = position - data.subtree_com[1]
         finite = jnp.isfinite(data.qpos).all() & jnp.isfinite(data.qvel).all()
         return Kinematics(
-            qpos=data.qpos,
-            qvel=data.qvel,
+            qpos=data.qpos[:joints],
+            qvel=data.qvel[: joints - 1],
             link_position=position,
-            link_quaternion=data.xquat[1:],
+            link_quaternion=data.xquat[links],
             link_angular_velocity=angular,
             link_linear_velocity=cvel[:, 3:] + jnp.cross(angular, arm),
             torque=torque,
             finite=finite,
+            prop_position=data.xpos[links.stop :] if len(balls) else None,
+            prop_velocity=balls[:, :3] if len(balls) else None,
         )
 
 

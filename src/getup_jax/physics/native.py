@@ -23,10 +23,36 @@ from mujoco.batch import Batch, SimulationError
 
 from getup_jax.config import PhysicsConfig
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.types import Kinematics, PhysicsState
+from getup_jax.physics.props import with_balls
+from getup_jax.types import Kinematics, PhysicsState, PropCommand
 
 _STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
 _FAST_LIMIT = 1e4  # rad/s or m/s; a state past it has diverged
+
+
+class _Sizes:
+    """How much of the model's state is the character's; balls come behind it."""
+
+    def __init__(self, character: CharacterSpec):
+        self.links, self.joints = len(character.link_names), character.num_joints
+        self.balls = len(character.ball_names)
+        self.qpos, self.qvel = 7 + self.joints, 6 + self.joints
+
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Of the Kinematics' fields, without the axis B and the finite flag."""
+        vector = (self.links, 3)
+        shapes: dict[str, tuple[int, ...]] = {
+            "qpos": (self.qpos,),
+            "qvel": (self.qvel,),
+            "link_position": vector,
+            "link_quaternion": (self.links, 4),
+            "link_angular_velocity": vector,
+            "link_linear_velocity": vector,
+            "torque": (self.joints,),
+        }
+        if self.balls:
+            shapes |= {"prop_position": (self.balls, 3), "prop_velocity": (self.balls, 3)}
+        return shapes
 
 
 class NativeEngine:
@@ -36,7 +62,8 @@ class NativeEngine:
     compiler_options: dict[str, Any] | None = None
 
     def __init__(self, character: CharacterSpec, config: PhysicsConfig):
-        self.model = _without_autoreset(character.model)
+        self.model = _without_autoreset(character.scene)
+        self._sizes = _Sizes(character)
         self.control_dt = 1.0 / config.control_hz
         self._substeps = config.substeps
         self._threads = config.threads or len(os.sched_getaffinity(0))
@@ -46,51 +73,49 @@ class NativeEngine:
     def place(self, qpos: Any, qvel: Any) -> PhysicsState:
         """See `Engine.place`; runs on the host."""
         qpos, qvel = np.asarray(qpos, np.float64), np.asarray(qvel, np.float64)
+        qpos, qvel = with_balls(qpos, qvel, self.model)
         batch = self._batch(len(qpos))
         return batch.place(qpos, qvel)
 
-    def step(self, state: PhysicsState, ctrl: jax.Array) -> PhysicsState:
+    def step(
+        self, state: PhysicsState, ctrl: jax.Array, balls: PropCommand | None = None
+    ) -> PhysicsState:
         """See `Engine.step`."""
         batch = self._batch(ctrl.shape[0])
         call = buffer_callback(batch.step, batch.result_shapes, vmap_method=None)
-        rows, kinematics = call(state.engine, ctrl.astype(jnp.float32))
+        command = () if balls is None else (balls.mask, balls.position, balls.velocity)
+        rows, kinematics = call(state.engine, ctrl.astype(jnp.float32), *command)
         return PhysicsState(engine=rows, kinematics=Kinematics(**kinematics))
 
     def _batch(self, size: int) -> _HostBatch:
         # one set of MjData per batch size, made when it is first asked for
         with self._lock:
             if size not in self._batches:
-                self._batches[size] = _HostBatch(self.model, size, self._threads, self._substeps)
+                self._batches[size] = _HostBatch(self, size)
             return self._batches[size]
 
 
 class _HostBatch:
     """The host side of one batch size: NumPy only."""
 
-    def __init__(self, model: mujoco.MjModel, size: int, threads: int, substeps: int):
+    def __init__(self, engine: NativeEngine, size: int):
         # persistent: the stage at the end of a step is not computed again by the next one
-        self._batch = Batch(model, size, min(threads, size), persistent=True)
-        self._substeps = substeps
+        self._batch = Batch(engine.model, size, min(engine._threads, size), persistent=True)
+        self._substeps = engine._substeps
+        self._sizes = engine._sizes
         fields = ("qpos", "qvel", "ctrl", "xpos", "xquat", "cvel", "subtree_com", "actuator_force")
         self._views = {name: self._batch.bind(name) for name in fields}
-        links = model.nbody - 1
-        shapes = {
-            "qpos": (model.nq,),
-            "qvel": (model.nv,),
-            "link_position": (links, 3),
-            "link_quaternion": (links, 4),
-            "link_angular_velocity": (links, 3),
-            "link_linear_velocity": (links, 3),
-            "torque": (model.nu,),
-        }
+        shapes = self._sizes.shapes()
         kinematics = {k: jax.ShapeDtypeStruct((size, *s), np.float32) for k, s in shapes.items()}
         kinematics["finite"] = jax.ShapeDtypeStruct((size,), np.bool_)
         rows = jax.ShapeDtypeStruct((size, 2 * self._batch.nstate), np.uint32)
         self.result_shapes = (rows, kinematics)
 
-    def step(self, _: Any, out: Any, rows: Any, ctrl: Any) -> None:
-        """One control period, from rows and ctrl into the output buffers."""
+    def step(self, _: Any, out: Any, rows: Any, ctrl: Any, *balls: Any) -> None:
+        """One control period, from rows, ctrl and a command of balls into the output buffers."""
         self._batch.state[...] = np.asarray(rows).view(np.float64)
+        if balls:
+            self._put_balls(*(np.asarray(part) for part in balls))
         self._views["ctrl"][...] = np.nan_to_num(np.asarray(ctrl))
         failed = np.zeros(self._batch.nsim, bool)
         try:
@@ -105,7 +130,7 @@ class _HostBatch:
         """Rows and kinematics at the given positions and velocities, ctrl = hinge angles."""
         self._batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         self._views["qpos"][...], self._views["qvel"][...] = qpos, qvel
-        self._views["ctrl"][...] = qpos[:, 7:]
+        self._views["ctrl"][...] = qpos[:, 7 : self._sizes.qpos]
         self._batch.forward()
         rows = self._batch.state.view(np.uint32).copy()
         out = {k: np.empty(s.shape, s.dtype) for k, s in self.result_shapes[1].items()}
@@ -113,18 +138,38 @@ class _HostBatch:
         kinematics = Kinematics(**{name: jnp.asarray(value) for name, value in out.items()})
         return PhysicsState(engine=jnp.asarray(rows), kinematics=kinematics)
 
+    def _put_balls(self, mask: np.ndarray, position: np.ndarray, velocity: np.ndarray) -> None:
+        """Set the balls of the mask [B, Q]; they do not spin."""
+        size, count = self._sizes, mask.shape[1]
+        qpos = self._views["qpos"][:, size.qpos :].reshape(-1, count, 7)
+        qvel = self._views["qvel"][:, size.qvel :].reshape(-1, count, 6)
+        at = mask[..., None]
+        qpos[..., :3] = np.where(at, position, qpos[..., :3])
+        qvel[..., :3] = np.where(at, velocity, qvel[..., :3])
+        qvel[..., 3:] = np.where(at, 0.0, qvel[..., 3:])
+        self._views["qpos"][:, size.qpos :] = qpos.reshape(len(mask), -1)
+        self._views["qvel"][:, size.qvel :] = qvel.reshape(len(mask), -1)
+
     def _write(self, failed: np.ndarray, out: dict[str, np.ndarray]) -> None:
-        view = self._views
-        out["qpos"][...], out["qvel"][...] = view["qpos"], view["qvel"]
+        view, size = self._views, self._sizes
+        links = slice(1, 1 + size.links)
+        out["qpos"][...], out["qvel"][...] = (
+            view["qpos"][:, : size.qpos],
+            view["qvel"][:, : size.qvel],
+        )
         out["torque"][...] = view["actuator_force"]
-        position = view["xpos"][:, 1:]
+        position = view["xpos"][:, links]
         out["link_position"][...] = position
-        out["link_quaternion"][...] = view["xquat"][:, 1:]
-        angular, linear = view["cvel"][:, 1:, :3], view["cvel"][:, 1:, 3:]
+        out["link_quaternion"][...] = view["xquat"][:, links]
+        angular, linear = view["cvel"][:, links, :3], view["cvel"][:, links, 3:]
         out["link_angular_velocity"][...] = angular
         # cvel's linear part is at the centre of mass of the whole tree; move it to the joint
         arm = position - view["subtree_com"][:, 1:2]
         out["link_linear_velocity"][...] = linear + np.cross(angular, arm)
+        if size.balls:
+            free = view["qvel"][:, size.qvel :].reshape(-1, size.balls, 6)
+            out["prop_position"][...] = view["xpos"][:, links.stop :]
+            out["prop_velocity"][...] = free[..., :3]
         speed = np.abs(view["qvel"]).max(axis=1)  # NaN compares as False
         finite = np.isfinite(view["qpos"]).all(axis=1) & (speed < _FAST_LIMIT)
         out["finite"][...] = finite & ~failed

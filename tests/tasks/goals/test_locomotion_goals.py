@@ -20,6 +20,8 @@ DT = 1 / 30
 HEADING = TargetHeading(DT)
 LOCATION = TargetLocation(DT)
 AIMING = Aiming(DT, forearm=LINKS.index("forearm_r"), hand=LINKS.index("hand_r"))
+HEADING_STEP, LOCATION_STEP = jax.jit(HEADING.step), jax.jit(LOCATION.step)
+AIMING_STEP = jax.jit(AIMING.step)
 
 
 def heading_state(direction=(0.0, 1.0), speed=1.5, time_left=2.0):
@@ -49,7 +51,7 @@ def location_state(place=(4.0, 0.0), time_left=3.0, reached=False):
 )
 def test_heading_reward(velocity, expected):
     seen = kinematics(velocity={"pelvis": velocity})
-    _, output = HEADING.step(KEY, heading_state(), seen)
+    _, output = HEADING_STEP(KEY, heading_state(), seen)
     assert output.reward[0] == pytest.approx(expected, rel=1e-5)
     assert not output.terminated[0]
 
@@ -61,10 +63,10 @@ def test_heading_is_observed_from_the_character():
 
 def test_heading_changes_when_its_time_is_over():
     seen = kinematics(yaw=1.0)
-    after, _ = HEADING.step(KEY, heading_state(time_left=0.5), seen)
+    after, _ = HEADING_STEP(KEY, heading_state(time_left=0.5), seen)
     np.testing.assert_allclose(after.direction, [[0.0, 1.0]])
     assert after.time_left[0] == pytest.approx(0.5 - DT)
-    after, _ = HEADING.step(KEY, heading_state(time_left=DT / 2), seen)
+    after, _ = HEADING_STEP(KEY, heading_state(time_left=DT / 2), seen)
     assert 3.0 <= after.time_left[0] <= 5.0
     yaw = np.arctan2(after.direction[0, 1], after.direction[0, 0])
     assert abs(yaw - 1.0) <= HEADING.turn
@@ -88,7 +90,7 @@ def test_heading_changes_when_its_time_is_over():
 )
 def test_location_reward(place, time_left, velocity, expected):
     seen = kinematics(velocity={"pelvis": velocity})
-    _, output = LOCATION.step(KEY, location_state(place, time_left), seen)
+    _, output = LOCATION_STEP(KEY, location_state(place, time_left), seen)
     assert output.reward[0] == pytest.approx(expected, rel=1e-4)
     assert not output.terminated[0]
 
@@ -103,20 +105,20 @@ def test_location_observation():
 
 def test_location_success_is_having_been_there():
     near, far = kinematics(), kinematics(position={"pelvis": (3.0, 0.0, 0.9)})
-    state, output = LOCATION.step(KEY, location_state((0.4, 0.0)), near)
+    state, output = LOCATION_STEP(KEY, location_state((0.4, 0.0)), near)
     assert np.isnan(output.success[0])  # the time is not over
     assert state.reached[0]
     state = state.replace(time_left=jnp.asarray([DT / 2]))
-    after, output = LOCATION.step(KEY, state, far)
+    after, output = LOCATION_STEP(KEY, state, far)
     assert output.success[0] == 1.0
     assert not after.reached[0]  # the next place
-    _, output = LOCATION.step(KEY, location_state((9.0, 0.0), DT / 2), near)
+    _, output = LOCATION_STEP(KEY, location_state((9.0, 0.0), DT / 2), near)
     assert output.success[0] == 0.0
 
 
 def test_a_new_place_is_within_reach():
     many = jax.tree.map(lambda x: jnp.repeat(x, 200, axis=0), kinematics())
-    state = LOCATION.reset(KEY, many)
+    state = jax.jit(LOCATION.reset)(KEY, many)
     pace = np.linalg.norm(state.place, axis=1) / np.asarray(state.time_left)
     assert pace.min() >= 1.2 - 1e-5
     assert pace.max() <= 1.5 + 1e-5
@@ -133,7 +135,7 @@ def test_a_new_place_is_within_reach():
 def test_aiming_reward(hand, expected):
     seen = kinematics(position={"forearm_r": (0.0, 0.0, 1.0), "hand_r": hand})
     state = AimingState(direction=jnp.asarray([[1.0, 0.0, 0.0]]), time_left=jnp.asarray([1.0]))
-    _, output = AIMING.step(KEY, state, seen)
+    _, output = AIMING_STEP(KEY, state, seen)
     assert output.reward[0] == pytest.approx(expected, rel=1e-5)
 
 
@@ -146,7 +148,7 @@ def test_aiming_is_observed_from_the_character():
 def test_goals_combine():
     goals = Goals((LOCATION, AIMING))
     seen = kinematics(position={"hand_r": (0.3, 0.0, 0.0)})
-    states = goals.reset(KEY, seen)
+    states = jax.jit(goals.reset)(KEY, seen)
     assert goals.observe(states, seen).shape == (1, 7) == (1, goals.observation_size)
     after, outputs = jax.jit(goals.step)(KEY, states, seen)
     assert goals.names == ("target_location", "aiming")

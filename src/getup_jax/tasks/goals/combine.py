@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import jax
@@ -12,14 +12,18 @@ import jax.numpy as jnp
 
 from getup_jax.config import ConfigError
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.physics.props import Ball
+from getup_jax.physics.props import Ball, Equipment
 from getup_jax.tasks.goals.aiming import Aiming
 from getup_jax.tasks.goals.goal import Goal, GoalOutput, Marker
+from getup_jax.tasks.goals.juggling import Juggling
 from getup_jax.tasks.goals.target_heading import TargetHeading
 from getup_jax.tasks.goals.target_location import TargetLocation
+from getup_jax.tasks.goals.tennis_swing import TennisSwing
 from getup_jax.types import Kinematics, PropCommand
 
-GOALS: dict[str, type] = {goal.name: goal for goal in (TargetHeading, TargetLocation, Aiming)}
+GOALS: dict[str, type] = {
+    goal.name: goal for goal in (TargetHeading, TargetLocation, Aiming, TennisSwing, Juggling)
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,6 +100,15 @@ class Goals:
             first = own.stop
             seen.append(_with_balls(kinematics, own))
         return seen
+
+
+def equipment_of(names: Collection[str]) -> Equipment:
+    """What the character must be loaded with for the goals of a config, before they are made."""
+    for name in names:
+        _check_name(name, tuple(GOALS), "composite.goals")
+    kinds = [GOALS[name] for name in names]
+    balls = tuple(ball for kind in kinds for ball in kind.balls)
+    return Equipment(balls=balls, racket=any(getattr(kind, "racket", False) for kind in kinds))
 
 
 def make_goals(

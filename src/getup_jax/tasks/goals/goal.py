@@ -42,16 +42,8 @@ class Goal(Protocol):
     """One goal task. `settings` of a config are the dataclass' fields with a default."""
 
     name: ClassVar[str]
-
-    @property
-    def observation_size(self) -> int:
-        """G, the size of the goal state g."""
-        ...
-
-    @property
-    def balls(self) -> tuple[Ball, ...]:
-        """Bodies that the goal plays with, in the order of its PropCommand."""
-        ...
+    observation_size: ClassVar[int]  # G, the size of the goal state g
+    balls: ClassVar[tuple[Ball, ...]]  # that it plays with, in the order of its PropCommand
 
     def reset(self, key: jax.Array, kinematics: Kinematics) -> Any:
         """State of B fresh episodes: a pytree of leaves [B, ...]."""

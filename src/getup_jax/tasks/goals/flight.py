@@ -1,0 +1,26 @@
+"""Free flight of a ball, without air."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+
+GRAVITY = 9.81  # m/s^2
+_DOWN = (0.0, 0.0, -GRAVITY)
+
+
+def throw(start: jax.Array, end: jax.Array, time: float) -> jax.Array:
+    """Velocity [..., 3] (m/s) that carries a ball from start to end [..., 3] (m) in a time (s)."""
+    return (end - start) / time - 0.5 * jnp.asarray(_DOWN) * time
+
+
+def landing(position: jax.Array, velocity: jax.Array) -> jax.Array:
+    """Where on the floor [..., 2] (m) a ball comes down from position with velocity [..., 3]."""
+    height, up = jnp.maximum(position[..., 2], 0.0), velocity[..., 2]
+    time = (up + jnp.sqrt(jnp.square(up) + 2.0 * GRAVITY * height)) / GRAVITY
+    return position[..., :2] + velocity[..., :2] * time[..., None]
+
+
+def kick(before: jax.Array, after: jax.Array, time: float) -> jax.Array:
+    """Speed (m/s) [...] that something else than gravity has added in a time (s)."""
+    return jnp.linalg.norm(after - before - jnp.asarray(_DOWN) * time, axis=-1)

@@ -1,0 +1,168 @@
+"""Juggling: a cascade of three balls, caught and released by the rules of the paper [C 6.4].
+
+A flying ball near the free hand that it was thrown to is caught and moves with it. Every hand
+lets go at a fixed interval, half of it after the other hand; the ball leaves with the hand's own
+velocity, so that the policy does the throwing. The reward's form is not public and our own: a
+hand earns 1 while it holds a ball, and less the farther it is from the ball that it must catch.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+
+from getup_jax.physics.props import Ball
+from getup_jax.tasks.goals.flight import throw
+from getup_jax.tasks.goals.goal import GoalOutput, Marker, heading_frame
+from getup_jax.types import Kinematics, PropCommand
+
+LEFT, RIGHT, NONE = 0, 1, -1
+_COUNT = 3
+_SHARPNESS = 3.0  # 1/m
+
+
+@struct.dataclass
+class JugglingState:
+    """Who holds which ball. Hands: LEFT, RIGHT or NONE."""
+
+    frame: jax.Array  # [B] int32, control steps since the start
+    holder: jax.Array  # [B, 3] int32, the hand that holds each ball; NONE: it flies
+    catcher: jax.Array  # [B, 3] int32, the hand that each flying ball was thrown to
+    leaving: jax.Array  # [B, 3] int32, the hand that each ball leaves right now, else NONE
+
+
+@dataclasses.dataclass(frozen=True)
+class Juggling:
+    """Settings of the goal."""
+
+    control_dt: float
+    left: int  # link index of the left hand
+    right: int
+    interval: int = 20  # control steps between two releases of the same hand
+    catch_m: float = 0.12  # a ball as near to its hand is caught
+    drop_m: float = 0.3  # a ball as low is lost, which ends the episode
+    first_throw_s: float = 0.5  # flight of the third ball, which is in the air at the start
+
+    name: ClassVar[str] = "juggling"
+    links: ClassVar[dict[str, str]] = {"left": "hand_l", "right": "hand_r"}
+    observation_size: ClassVar[int] = 6 * _COUNT + 2 * _COUNT + 2
+    balls: ClassVar[tuple[Ball, ...]] = tuple(
+        Ball(f"juggling_{i}", 0.04, 0.1, (0.9, 0.3 + 0.25 * i, 0.2, 1.0)) for i in range(_COUNT)
+    )
+
+    def reset(self, key: jax.Array, kinematics: Kinematics) -> JugglingState:
+        """A ball in each hand, and one on its way from the right to the left."""
+        count = len(kinematics.finite)
+
+        def everywhere(hands: tuple[int, ...]) -> jax.Array:
+            return jnp.tile(jnp.asarray(hands, jnp.int32), (count, 1))
+
+        return JugglingState(
+            frame=jnp.zeros(count, jnp.int32),
+            holder=everywhere((LEFT, RIGHT, NONE)),
+            catcher=everywhere((RIGHT, LEFT, LEFT)),
+            leaving=everywhere((NONE, NONE, RIGHT)),
+        )
+
+    def step(
+        self, key: jax.Array, state: JugglingState, kinematics: Kinematics
+    ) -> tuple[JugglingState, GoalOutput]:
+        """Catch, reward, then release."""
+        distance = self._distance(kinematics)  # [B, Q, 2]
+        frame = state.frame + 1
+        free = ~jnp.any(state.holder[..., None] == jnp.arange(2), axis=1)  # [B, 2]
+        flying = state.holder == NONE
+        mine = flying[..., None] & (state.catcher[..., None] == jnp.arange(2))
+        nearest = distance == jnp.min(jnp.where(mine, distance, jnp.inf), axis=1, keepdims=True)
+        near = distance < self.catch_m
+        caught = jnp.any(mine & free[:, None] & near & nearest, axis=2)  # [B, Q]
+        holder = jnp.where(caught, state.catcher, state.holder)
+        lost = jnp.any((holder == NONE) & self._low(kinematics), axis=1)
+        output = GoalOutput(
+            reward=self._reward(holder, state.catcher, distance),
+            terminated=lost,
+            success=jnp.where(lost, 0.0, jnp.where(jnp.any(caught, axis=1), 1.0, jnp.nan)),
+        )
+        release = jnp.where(holder == NONE, False, holder == self._releasing(frame)[:, None])
+        return JugglingState(
+            frame=frame,
+            holder=jnp.where(release, NONE, holder),
+            catcher=jnp.where(release, 1 - holder, state.catcher),
+            leaving=jnp.where(release, holder, NONE),
+        ), output
+
+    def observe(self, state: JugglingState, kinematics: Kinematics) -> jax.Array:
+        """Balls from the root 9, their velocities 9, holders 6, time to the releases 2."""
+        command = self.command(state, kinematics)
+        at = command.mask[..., None]
+        position = jnp.where(at, command.position, self._position(kinematics))
+        velocity = jnp.where(at, command.velocity, self._velocity(kinematics))
+        position = position - kinematics.link_position[:, :1]
+        blocks = [
+            heading_frame(kinematics, v[:, i]) for v in (position, velocity) for i in range(3)
+        ]
+        held = (state.holder[..., None] == jnp.arange(2)).astype(jnp.float32)
+        blocks.append(held.reshape(len(held), -1))
+        first = jnp.asarray([self.interval // 2, 0])  # the left hand is the first
+        blocks.append(jnp.mod(first - state.frame[:, None], self.interval) / self.interval)
+        return jnp.concatenate(blocks, axis=-1)
+
+    def command(self, state: JugglingState, kinematics: Kinematics) -> PropCommand:
+        """Held balls go with their hand; a ball that leaves takes its velocity."""
+        hand = jnp.where(state.holder == NONE, state.leaving, state.holder)  # [B, Q]
+        place = self._of_hands(kinematics.link_position)
+        motion = self._of_hands(kinematics.link_linear_velocity)
+        index = jnp.maximum(hand, 0)[..., None]
+        position = jnp.take_along_axis(place, index, axis=1)
+        velocity = jnp.take_along_axis(motion, index, axis=1)
+        thrown = throw(place[:, RIGHT], place[:, LEFT], self.first_throw_s)
+        start = (state.frame == 0)[:, None]
+        last = jnp.where(start, thrown, velocity[:, 2])
+        velocity = velocity.at[:, 2].set(last)
+        return PropCommand(mask=hand != NONE, position=position, velocity=velocity)
+
+    def markers(self, state: JugglingState, kinematics: Kinematics) -> list[Marker]:
+        """A halo around the hand that must catch next."""
+        hands = {LEFT: self.left, RIGHT: self.right}
+        flying = np.asarray(state.holder) == NONE
+        wanted = {int(hand) for hand in np.asarray(state.catcher)[flying]}
+        places = [np.asarray(kinematics.link_position[hands[hand]]) for hand in sorted(wanted)]
+        return [Marker(position=p, radius=self.catch_m, rgba=(0.2, 0.8, 0.2, 0.3)) for p in places]
+
+    def _releasing(self, frame: jax.Array) -> jax.Array:
+        """The hand that lets go in this control step, [B]; NONE in most."""
+        beat = self.interval // 2
+        hand = jnp.where((frame // beat) % 2 == 1, LEFT, RIGHT)
+        return jnp.where(frame % beat == 0, hand, NONE)
+
+    def _reward(self, holder: jax.Array, catcher: jax.Array, distance: jax.Array) -> jax.Array:
+        """Mean over the hands [B]: 1 with a ball, exp(-3 d) at d (m) from the ball to catch."""
+        hands = jnp.arange(2)
+        holding = jnp.any(holder[..., None] == hands, axis=1)  # [B, 2]
+        aimed = (holder == NONE)[..., None] & (catcher[..., None] == hands)
+        gap = jnp.min(jnp.where(aimed, distance, jnp.inf), axis=1)
+        return jnp.mean(jnp.where(holding, 1.0, jnp.exp(-_SHARPNESS * gap)), axis=1)
+
+    def _distance(self, kinematics: Kinematics) -> jax.Array:
+        """From every ball to both hands, [B, Q, 2] (m)."""
+        hands = self._of_hands(kinematics.link_position)
+        return jnp.linalg.norm(self._position(kinematics)[:, :, None] - hands[:, None], axis=-1)
+
+    def _low(self, kinematics: Kinematics) -> jax.Array:
+        return self._position(kinematics)[..., 2] < self.drop_m
+
+    def _of_hands(self, links: jax.Array) -> jax.Array:
+        return links[:, jnp.asarray([self.left, self.right])]
+
+    def _position(self, kinematics: Kinematics) -> jax.Array:
+        assert kinematics.prop_position is not None, "the character must be loaded with the balls"
+        return kinematics.prop_position
+
+    def _velocity(self, kinematics: Kinematics) -> jax.Array:
+        assert kinematics.prop_velocity is not None, "the character must be loaded with the balls"
+        return kinematics.prop_velocity

@@ -1,0 +1,121 @@
+"""Juggling by hand: who holds what, what is thrown, what is lost, and what it earns."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from goal_samples import LINKS, kinematics
+
+from getup_jax.tasks.goals.flight import GRAVITY
+from getup_jax.tasks.goals.juggling import LEFT, NONE, RIGHT, Juggling, JugglingState
+
+KEY = jax.random.key(0)
+GOAL = Juggling(1 / 30, left=LINKS.index("hand_l"), right=LINKS.index("hand_r"))
+STEP, COMMAND, OBSERVE = jax.jit(GOAL.step), jax.jit(GOAL.command), jax.jit(GOAL.observe)
+HANDS = {"hand_l": (0.3, 0.2, 1.0), "hand_r": (0.3, -0.2, 1.0)}
+MOTION = {"hand_l": (0.0, 0.1, 3.0), "hand_r": (0.0, 0.0, 1.0)}
+UP = (0.3, 0.2, 1.5)  # half a metre above the left hand
+
+
+def seen(*balls):
+    return kinematics(position=HANDS, velocity=MOTION, balls=balls)
+
+
+def state(frame=1, holder=(LEFT, RIGHT, NONE), catcher=(RIGHT, LEFT, LEFT), leaving=(NONE,) * 3):
+    rows = (jnp.asarray([values], jnp.int32) for values in (holder, catcher, leaving))
+    return JugglingState(jnp.asarray([frame], jnp.int32), *rows)
+
+
+def test_a_ball_near_its_free_hand_is_caught():
+    free = state(holder=(NONE, RIGHT, NONE), catcher=(RIGHT, LEFT, LEFT))
+    near = (0.3, 0.2, 1.1)
+    after, output = STEP(KEY, free, seen((0.3, 0.2, 2.0), HANDS["hand_r"], near))
+    assert after.holder[0].tolist() == [NONE, RIGHT, LEFT]
+    assert output.success[0] == 1.0
+    assert output.reward[0] == pytest.approx(1.0)  # both hands hold one
+    after, output = STEP(KEY, free, seen((0.3, 0.2, 2.0), HANDS["hand_r"], UP))
+    assert after.holder[0].tolist() == [NONE, RIGHT, NONE]
+    assert np.isnan(output.success[0])
+
+
+def test_a_hand_that_holds_a_ball_catches_no_other():
+    after, _ = STEP(KEY, state(), seen(HANDS["hand_l"], HANDS["hand_r"], HANDS["hand_l"]))
+    assert after.holder[0].tolist() == [LEFT, RIGHT, NONE]
+
+
+def test_a_hand_does_not_catch_what_was_thrown_to_the_other():
+    thrown = state(holder=(NONE, NONE, RIGHT), catcher=(RIGHT, RIGHT, LEFT))
+    after, _ = STEP(KEY, thrown, seen(HANDS["hand_l"], UP, HANDS["hand_r"]))
+    assert after.holder[0].tolist() == [NONE, NONE, RIGHT]
+
+
+def test_of_two_balls_the_nearer_is_caught():
+    both = state(holder=(NONE, NONE, RIGHT), catcher=(LEFT, LEFT, LEFT))
+    after, _ = STEP(KEY, both, seen((0.3, 0.2, 1.05), (0.3, 0.2, 1.01), HANDS["hand_r"]))
+    assert after.holder[0].tolist() == [NONE, LEFT, RIGHT]
+
+
+def test_the_hands_let_go_in_turn_twenty_steps_apart():
+    held = seen(HANDS["hand_l"], HANDS["hand_r"], UP)
+    released = {}
+    for frame in range(1, 41):
+        after, _ = STEP(KEY, state(frame=frame - 1), held)
+        left = [ball for ball in (0, 1) if after.holder[0, ball] == NONE]
+        if left:
+            released[frame] = left
+            assert after.leaving[0, left[0]] == (LEFT, RIGHT)[left[0]]
+            assert after.catcher[0, left[0]] == (RIGHT, LEFT)[left[0]]
+    assert released == {10: [0], 20: [1], 30: [0], 40: [1]}
+
+
+def test_held_and_leaving_balls_move_with_their_hand():
+    command = COMMAND(state(), seen(UP, UP, UP))
+    assert command.mask[0].tolist() == [True, True, False]
+    np.testing.assert_allclose(command.position[0, 0], HANDS["hand_l"], atol=1e-6)
+    np.testing.assert_allclose(command.velocity[0, 1], MOTION["hand_r"], atol=1e-6)
+    leaving = state(holder=(NONE, RIGHT, NONE), leaving=(LEFT, NONE, NONE))
+    command = COMMAND(leaving, seen(UP, UP, UP))
+    assert command.mask[0].tolist() == [True, True, False]
+    np.testing.assert_allclose(command.velocity[0, 0], MOTION["hand_l"], atol=1e-6)
+    after, _ = STEP(KEY, leaving, seen(UP, HANDS["hand_r"], UP))
+    assert COMMAND(after, seen(UP, UP, UP)).mask[0].tolist() == [False, True, False]
+
+
+def test_the_third_ball_starts_towards_the_left_hand():
+    fresh = GOAL.reset(KEY, seen(UP, UP, UP))
+    command = COMMAND(fresh, seen(UP, UP, UP))
+    assert command.mask[0].tolist() == [True, True, True]
+    np.testing.assert_allclose(command.position[0, 2], HANDS["hand_r"], atol=1e-6)
+    time = GOAL.first_throw_s
+    fall = jnp.asarray([0.0, 0.0, -0.5 * GRAVITY * time**2])
+    there = command.position[0, 2] + command.velocity[0, 2] * time + fall
+    np.testing.assert_allclose(there, HANDS["hand_l"], atol=1e-5)
+
+
+def test_a_ball_near_the_floor_is_lost():
+    low = (1.0, 0.0, 0.29)
+    _, output = STEP(KEY, state(), seen(HANDS["hand_l"], HANDS["hand_r"], low))
+    assert output.terminated[0]
+    assert output.success[0] == 0.0
+    _, output = STEP(KEY, state(), seen(low, HANDS["hand_r"], UP))  # held: it is in the hand
+    assert not output.terminated[0]
+
+
+def test_reward_by_hand():
+    free = state(holder=(NONE, RIGHT, NONE), catcher=(RIGHT, LEFT, LEFT))
+    _, output = STEP(KEY, free, seen((0.0, 0.0, 2.0), HANDS["hand_r"], UP))  # left: .5 m to ball 2
+    assert output.reward[0] == pytest.approx(0.5 * (1.0 + np.exp(-1.5)), rel=1e-5)
+    idle = state(holder=(NONE, NONE, NONE), catcher=(RIGHT, RIGHT, RIGHT))
+    above = (0.3, -0.2, 1.3)
+    _, output = STEP(KEY, idle, seen(above, (0, 0, 3), (0, 0, 3)))  # nothing for the left hand
+    assert output.reward[0] == pytest.approx(0.5 * np.exp(-0.9), rel=1e-5)
+
+
+def test_observation_has_its_size_and_the_time_to_the_releases():
+    observed = np.asarray(OBSERVE(state(frame=4), seen(UP, UP, UP)))
+    assert observed.shape == (1, GOAL.observation_size)
+    np.testing.assert_allclose(observed[0, 6:9], UP)  # ball 2 from the root, at the origin
+    np.testing.assert_allclose(observed[0, 18:24], [1, 0, 0, 1, 0, 0])
+    np.testing.assert_allclose(observed[0, 24:], [0.3, 0.8], atol=1e-6)
