@@ -145,6 +145,15 @@ def test_aiming_is_observed_from_the_character():
     np.testing.assert_allclose(observed, [0.6, 0.0, 0.8], atol=1e-6)
 
 
+def test_new_aims_lie_around_the_heading():
+    many = jax.tree.map(lambda x: jnp.repeat(x, 200, axis=0), kinematics(yaw=1.0))
+    aims = np.asarray(jax.jit(AIMING.reset)(KEY, many).direction)
+    np.testing.assert_allclose(np.linalg.norm(aims, axis=1), 1.0, atol=1e-5)
+    yaw, pitch = np.arctan2(aims[:, 1], aims[:, 0]) - 1.0, np.arcsin(aims[:, 2])
+    assert 0.7 < np.abs(yaw).max() <= AIMING.yaw + 1e-4
+    assert AIMING.pitch[0] - 1e-4 <= pitch.min() < 0 < pitch.max() <= AIMING.pitch[1] + 1e-4
+
+
 def test_goals_combine():
     goals = Goals((LOCATION, AIMING))
     seen = kinematics(position={"hand_r": (0.3, 0.0, 0.0)})

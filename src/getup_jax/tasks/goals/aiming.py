@@ -14,11 +14,12 @@ from getup_jax.physics.props import Ball
 from getup_jax.tasks.goals.goal import (
     GoalOutput,
     Marker,
+    floor_direction,
     heading_frame,
     never,
     no_event,
-    root_heading,
     uniform,
+    yaw_ahead,
 )
 from getup_jax.types import Kinematics, PropCommand, select
 
@@ -53,12 +54,12 @@ class Aiming:
         """A direction around where the character faces."""
         key_yaw, key_pitch, key_time = jax.random.split(key, 3)
         count = len(kinematics.finite)
-        yaw = root_heading(kinematics) + uniform(key_yaw, count, (-self.yaw, self.yaw))
+        level = floor_direction(yaw_ahead(key_yaw, kinematics, self.yaw))
         pitch = uniform(key_pitch, count, self.pitch)
-        level = jnp.cos(pitch)
-        direction = [level * jnp.cos(yaw), level * jnp.sin(yaw), jnp.sin(pitch)]
+        direction = [level * jnp.cos(pitch)[:, None], jnp.sin(pitch)[:, None]]
         return AimingState(
-            direction=jnp.stack(direction, axis=-1), time_left=uniform(key_time, count, self.time)
+            direction=jnp.concatenate(direction, axis=-1),
+            time_left=uniform(key_time, count, self.time),
         )
 
     def step(

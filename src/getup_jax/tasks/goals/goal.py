@@ -84,6 +84,16 @@ def root_heading(kinematics: Kinematics) -> jax.Array:
     return 2.0 * jnp.arctan2(q[:, 3], q[:, 0])
 
 
+def yaw_ahead(key: jax.Array, kinematics: Kinematics, most: float) -> jax.Array:
+    """Random yaws [B] (rad, world) at `most` so far off the root's heading."""
+    return root_heading(kinematics) + uniform(key, len(kinematics.finite), (-most, most))
+
+
+def floor_direction(yaw: jax.Array) -> jax.Array:
+    """Unit vectors on the floor [B, 2]."""
+    return jnp.stack([jnp.cos(yaw), jnp.sin(yaw)], axis=-1)
+
+
 def uniform(key: jax.Array, count: int, bounds: tuple[float, float]) -> jax.Array:
     """`count` numbers between two bounds."""
     return jax.random.uniform(key, (count,), minval=bounds[0], maxval=bounds[1])

@@ -17,11 +17,12 @@ from getup_jax.physics.props import Ball
 from getup_jax.tasks.goals.goal import (
     GoalOutput,
     Marker,
+    floor_direction,
     floor_frame,
     never,
     no_event,
-    root_heading,
     uniform,
+    yaw_ahead,
 )
 from getup_jax.tasks.goals.speed import velocity_reward
 from getup_jax.types import Kinematics, PropCommand, select
@@ -53,9 +54,8 @@ class TargetHeading:
         """A direction off the heading that the character has."""
         key_turn, key_speed, key_time = jax.random.split(key, 3)
         count = len(kinematics.finite)
-        yaw = root_heading(kinematics) + uniform(key_turn, count, (-self.turn, self.turn))
         return HeadingState(
-            direction=jnp.stack([jnp.cos(yaw), jnp.sin(yaw)], axis=-1),
+            direction=floor_direction(yaw_ahead(key_turn, kinematics, self.turn)),
             speed=uniform(key_speed, count, self.speed),
             time_left=uniform(key_time, count, self.time),
         )

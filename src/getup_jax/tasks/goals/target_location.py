@@ -14,10 +14,11 @@ from getup_jax.physics.props import Ball
 from getup_jax.tasks.goals.goal import (
     GoalOutput,
     Marker,
+    floor_direction,
     floor_frame,
     never,
-    root_heading,
     uniform,
+    yaw_ahead,
 )
 from getup_jax.tasks.goals.speed import velocity_reward
 from getup_jax.types import Kinematics, PropCommand, select
@@ -53,12 +54,11 @@ class TargetLocation:
         """A place that can be reached in time at a speed of the range."""
         key_turn, key_speed, key_time = jax.random.split(key, 3)
         count = len(kinematics.finite)
-        yaw = root_heading(kinematics) + uniform(key_turn, count, (-self.turn, self.turn))
+        direction = floor_direction(yaw_ahead(key_turn, kinematics, self.turn))
         time = uniform(key_time, count, self.time)
         distance = time * uniform(key_speed, count, self.speed)
-        away = jnp.stack([jnp.cos(yaw), jnp.sin(yaw)], axis=-1) * distance[:, None]
         return LocationState(
-            place=kinematics.link_position[:, 0, :2] + away,
+            place=kinematics.link_position[:, 0, :2] + direction * distance[:, None],
             time_left=time,
             reached=jnp.zeros(count, bool),
         )
