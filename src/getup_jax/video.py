@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import time
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from getup_jax.config import ConfigError
 from getup_jax.episodes import Episodes
 from getup_jax.progress import Display
 from getup_jax.scores import episode_values
+from getup_jax.tasks.goals import Marker
+from getup_jax.tasks.goals.drawing import add_markers
 
 STYLES = 8  # filmed at most
 SIZE = (480, 640)  # rows, columns
@@ -84,11 +87,15 @@ def caption(image: np.ndarray, text: str) -> np.ndarray:
 
 
 def render(
-    model: mujoco.MjModel, qpos: np.ndarray, size: tuple[int, int] = SIZE
+    model: mujoco.MjModel,
+    qpos: np.ndarray,
+    size: tuple[int, int] = SIZE,
+    markers: Sequence[Sequence[Marker]] | None = None,
 ) -> list[np.ndarray]:
     """Pictures [F][rows, columns, 3] of poses qpos [F, 7 + J]; the camera follows the pelvis.
 
-    Raises ConfigError where this machine cannot render.
+    `markers` [F] are what goal tasks want to be seen. Raises ConfigError where this machine
+    cannot render.
     """
     model = copy.copy(model)
     model.vis.quality.shadowsize = _SHADOW
@@ -97,11 +104,12 @@ def render(
     images = []
     ground = ground_below(model, qpos[0])
     with _renderer(model, size) as renderer:
-        for row in qpos:
+        for frame, row in enumerate(qpos):
             data.qpos[:] = row
             mujoco.mj_kinematics(model, data)
             camera.lookat[:] = (row[0], row[1], ground + 0.65)
             renderer.update_scene(data, camera)
+            add_markers(renderer.scene, markers[frame] if markers else ())
             images.append(renderer.render())
     return images
 

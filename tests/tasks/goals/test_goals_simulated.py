@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 
 from getup_jax.config import PhysicsConfig
 from getup_jax.physics.character import load_character
 from getup_jax.physics.native import NativeEngine
 from getup_jax.tasks.goals import equipment_of, make_goals
+from getup_jax.tasks.goals.drawing import add_markers
 from getup_jax.tasks.goals.juggling import LEFT, NONE, RIGHT
 
 CONFIG = PhysicsConfig(
@@ -54,6 +56,13 @@ def test_juggling_while_walking_to_a_target():
         assert seen.shape == (1, goals.observation_size)
         assert np.isfinite(seen).all()
         assert not outputs[1].terminated[0]
+    row = jax.tree.map(lambda x: x[0], (trace[-1][0], trace[-1][1]))
+    scene = mujoco.MjvScene(character.model, maxgeom=20)
+    markers = goals.markers(*row)
+    assert [m.radius for m in markers] == [0.12, 0.12, 0.04, 0.04, 0.04]  # place, hand, balls
+    add_markers(scene, markers)
+    drawn = [scene.geoms[i].pos for i in range(scene.ngeom)]
+    np.testing.assert_allclose(drawn, [m.position for m in markers], atol=1e-6)
     # the third ball, thrown at the start, was nearly at the left hand
     last = trace[-1][1]
     gap = np.asarray(last.prop_position)[0, 2] - last.link_position[0, hands[LEFT]]

@@ -9,6 +9,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from getup_jax.config import ConfigError
 from getup_jax.physics.character import CharacterSpec
@@ -88,9 +89,13 @@ class Goals:
         return jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis=1), *found)
 
     def markers(self, states: tuple[Any, ...], kinematics: Kinematics) -> list[Marker]:
-        """What to draw for one episode, given rows without the axis B."""
+        """What to draw for one episode, given rows without the axis B: markers and all balls."""
         pairs = zip(self.goals, states, strict=True)
-        return [marker for goal, state in pairs for marker in goal.markers(state, kinematics)]
+        found = [marker for goal, state in pairs for marker in goal.markers(state, kinematics)]
+        places = np.zeros((0, 3)) if not self.balls else np.asarray(kinematics.prop_position)
+        for ball, place in zip(self.balls, places, strict=True):
+            found.append(Marker(position=place, radius=ball.radius_m, rgba=ball.rgba))
+        return found
 
     def _seen(self, kinematics: Kinematics) -> list[Kinematics]:
         """What each goal sees: the character, and its own balls alone."""
