@@ -1,4 +1,4 @@
-"""The commands getup-train, getup-eval and getup-motion.
+"""The commands getup-train, getup-eval, getup-motion and getup-edit.
 
 What imports JAX is imported where it is used, after the arguments and the settings were
 checked, so that a typing mistake is answered at once.
@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from getup_jax import __version__, runfolder
+from getup_jax.editor.options import parse as parse_edit
 from getup_jax.eval_options import eval_parser
 from getup_jax.settings import find_config, load_config
 
@@ -44,6 +45,11 @@ def motion_main(argv: Sequence[str] | None = None) -> int:
     return _guard(_motion, argv)
 
 
+def edit_main(argv: Sequence[str] | None = None) -> int:
+    """`getup-edit`; returns the exit code."""
+    return _guard(_edit, parse_edit(argv))
+
+
 def _train(args: argparse.Namespace) -> int:
     config = load_config(args.config, args.overrides)
     folder = args.run or Path("runs") / find_config(args.config).stem
@@ -68,6 +74,14 @@ def _motion(argv: Sequence[str] | None) -> int:
     from getup_jax.motion.command import main
 
     return main(argv) or 0
+
+
+def _edit(args: argparse.Namespace) -> int:
+    _render_without_display()
+    os.environ.setdefault("JAX_PLATFORMS", "cpu")  # one character at a time is for a CPU
+    from getup_jax.editor.server import edit_command
+
+    return edit_command(args)
 
 
 def _render_without_display() -> None:

@@ -12,7 +12,8 @@ import numpy as np
 
 from getup_jax.config import Config, ConfigError
 from getup_jax.motion import events
-from getup_jax.motion.clips import GetUp
+from getup_jax.motion.clips import Clip, GetUp
+from getup_jax.motion.curve_file import CurveFile
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.tasks.episode import LYING, STANDING
 from getup_jax.tasks.region_pool import region_starts
@@ -31,12 +32,19 @@ class Conditions:
     blend: str | None = None  # half | random: mixtures of two curves; None: the curves themselves
     push_ns: float | None = None  # impulse to the chest while standing
     seed: int = 0
+    curves: tuple[str, ...] = ()  # curve files in place of the trained styles
 
     @classmethod
     def of(cls, args: argparse.Namespace) -> Conditions:
         """Those that `getup-eval` was asked for."""
         return cls(
-            args.start, args.start_noise, args.duration_scale, args.blend, args.push, args.seed
+            start=args.start,
+            start_noise_rad=args.start_noise,
+            duration_scale=args.duration_scale,
+            blend=args.blend,
+            push_ns=args.push,
+            seed=args.seed,
+            curves=tuple(map(str, args.curves or ())),
         )
 
     @property
@@ -136,6 +144,21 @@ def _with_start(
     clips = own or [g.clip for g in getups if g.clip is not None]
     gaps = [angle_gap(clip.qpos[0], mixed, character) for clip in clips]
     return dataclasses.replace(mixed, clip=clips[int(np.argmin(gaps))]) if clips else mixed
+
+
+def drawn(
+    files: Sequence[CurveFile], getups: Sequence[GetUp], character: CharacterSpec
+) -> tuple[GetUp, ...]:
+    """The styles in curve files, each with the motion whose first pose it names as its start."""
+    clips = reference_clips(getups)
+    return tuple(
+        getup for file in files for getup in file.getups(file.start_clip(clips, character))
+    )
+
+
+def reference_clips(getups: Sequence[GetUp]) -> dict[str, Clip]:
+    """The motions that a curve file may name as its start."""
+    return {getup.name: getup.clip for getup in getups if getup.clip is not None}
 
 
 def orientation(getup: GetUp) -> str:

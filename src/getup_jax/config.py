@@ -52,7 +52,10 @@ class PhysicsConfig:
 
 @dataclasses.dataclass(frozen=True)
 class MotionConfig:
-    """Which motions give the start poses, the curves and the pose prior's data."""
+    """Which motions give the start poses, the curves and the pose prior's data.
+
+    A source that ends in .yaml is a curve file: a style without a motion, see curve_file.py.
+    """
 
     source: tuple[str, ...] = ("authored",)  # `authored`, `deepmimic`, folders or files
     curves: tuple[str, ...] = ()  # names of the get-ups to train on; empty: all that are found

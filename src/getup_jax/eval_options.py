@@ -16,6 +16,7 @@ examples:
   getup-eval --start-noise 0.1 --duration-scale 0.8,1.2
                                                        other start poses, faster and slower
   getup-eval --blend --push 20                         curves never seen, and pushes
+  getup-eval --curves my_rise.yaml                     a style from getup-edit
 
 Every start has a random heading. Without --start-noise, episodes of one style differ in
 nothing else, so that more of them say little more.
@@ -41,7 +42,8 @@ def eval_parser() -> argparse.ArgumentParser:
         "--episodes",
         type=positive,
         metavar="N",
-        help="how many (default: 100, on irregular ground 100 in each region)",
+        help="how many (default: 100, on irregular ground 100 in each region; with --curves one "
+        "a curve and region)",
     )
     add("--seed", type=natural, default=0, metavar="S", help="of the starts (default: 0)")
     add("--start", choices=("lying", "standing"), default="lying", help="(default: lying)")
@@ -74,7 +76,16 @@ def _add_conditions(group: argparse._ArgumentGroup) -> None:
         metavar="LOW,HIGH",
         help="each episode's curves last T x U(LOW, HIGH), such as 0.8,1.2",
     )
-    add(
+    styles = group.add_mutually_exclusive_group()
+    styles.add_argument(
+        "--curves",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help="the styles in these curve files in place of the trained ones, each from the first "
+        "pose of the motion that it names; what getup-edit saves and shows",
+    )
+    styles.add_argument(
         "--blend",
         nargs="?",
         choices=("half", "random"),

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import functools
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,13 @@ import jax
 
 from getup_jax import checkpoint, eval_plot, video
 from getup_jax.algo.learner import Learner, make_learner
+from getup_jax.algo.state import PolicyState
 from getup_jax.checkpoint import LoadedPolicy
-from getup_jax.conditions import Conditions, blended, make_plan
+from getup_jax.conditions import Conditions, blended, drawn, make_plan
 from getup_jax.config import Config, ConfigError, TaskConfig, TerrainConfig
 from getup_jax.episodes import Episodes, run_episodes
 from getup_jax.motion.clips import GetUp
+from getup_jax.motion.curve_file import read_curve_file
 from getup_jax.nets import prior as pose_prior
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain_map import REGIONS
@@ -30,6 +33,8 @@ from getup_jax.tasks.build import BuiltTask, build_task
 
 _EPISODES = 100  # by default; on irregular ground in each region
 _DROPS = 1500  # rag-dolls on irregular ground
+
+Choice = Callable[[tuple[GetUp, ...], CharacterSpec], tuple[GetUp, ...]]
 
 
 def evaluate_command(args: argparse.Namespace) -> int:
@@ -60,12 +65,9 @@ def evaluate(
     config: Config, loaded: LoadedPolicy, conditions: Conditions, number: int, display: Display
 ) -> tuple[Episodes, Scores]:
     """Run and score the episodes; `config` is that of `evaluation_config`."""
-    choose = _mixtures(config, conditions) if conditions.blend else None
     prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
-    task = build_task(config, display.log, prior, choose)
-    learner = _learner(config, task)
-    template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0)).policy
-    policy = from_nested(template, loaded.policy, str(loaded.path))
+    task = build_task(config, display.log, prior, _styles(config, conditions))
+    learner, policy = restore_policy(config, loaded, task)
     *_, num_styles, rows = task.world.pool.table.shape
     plan = make_plan(conditions, number, num_styles, rows)
     if task.world.pool.startable is not None:
@@ -112,7 +114,8 @@ def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
 def episode_count(config: Config, args: argparse.Namespace) -> int:
     """How many episodes: as many as asked for, or the default for the ground."""
     regions = 1 if config.terrain is None else len(REGIONS)
-    return args.episodes or _EPISODES * regions
+    curves = sum(len(read_curve_file(path).durations) for path in args.curves or ())
+    return args.episodes or (curves or _EPISODES) * regions
 
 
 def _evaluation_terrain(terrain: TerrainConfig | None, seed: int | None) -> TerrainConfig | None:
@@ -164,19 +167,29 @@ class _Rate:
             self._shown = part
 
 
-def _mixtures(
-    config: Config, conditions: Conditions
-) -> Callable[[tuple[GetUp, ...], CharacterSpec], tuple[GetUp, ...]]:
-    def choose(getups: tuple[GetUp, ...], character: CharacterSpec) -> tuple[GetUp, ...]:
+def _styles(config: Config, conditions: Conditions) -> Choice | None:
+    """What makes the styles out of those of the training; None: they are the same."""
+    if conditions.curves:
+        files = [read_curve_file(path) for path in conditions.curves]
+        return functools.partial(drawn, files)
+    if not conditions.blend:
+        return None
+
+    def mixtures(getups: Sequence[GetUp], character: CharacterSpec) -> tuple[GetUp, ...]:
         return blended(getups, character, config.task.curve_match_rad, conditions)
 
-    return choose
+    return mixtures
 
 
-def _learner(config: Config, task: BuiltTask) -> Learner:
-    return make_learner(
+def restore_policy(
+    config: Config, loaded: LoadedPolicy, task: BuiltTask
+) -> tuple[Learner, PolicyState]:
+    """The learner of a task and the loaded policy in its form."""
+    learner = make_learner(
         task.environment, config.network, config.ppo, total_steps=config.train.total_steps
     )
+    template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0)).policy
+    return learner, from_nested(template, loaded.policy, str(loaded.path))
 
 
 def _write_pictures(film: Path | None, plot: Path | None, episodes: Episodes) -> None:

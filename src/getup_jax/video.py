@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -97,11 +97,20 @@ def render(
     `markers` [F] are what goal tasks want to be seen. Raises ConfigError where this machine
     cannot render.
     """
+    return list(pictures(model, qpos, size, markers))
+
+
+def pictures(
+    model: mujoco.MjModel,
+    qpos: np.ndarray,
+    size: tuple[int, int] = SIZE,
+    markers: Sequence[Sequence[Marker]] | None = None,
+) -> Iterator[np.ndarray]:
+    """The same, one after the other, for long films."""
     model = copy.copy(model)
     model.vis.quality.shadowsize = _SHADOW
     data, camera = mujoco.MjData(model), mujoco.MjvCamera()
     camera.distance, camera.elevation, camera.azimuth = 3.4, -14.0, view(qpos[0])
-    images = []
     ground = ground_below(model, qpos[0])
     with _renderer(model, size) as renderer:
         for frame, row in enumerate(qpos):
@@ -110,8 +119,7 @@ def render(
             camera.lookat[:] = (row[0], row[1], ground + 0.65)
             renderer.update_scene(data, camera)
             add_markers(renderer.scene, markers[frame] if markers else ())
-            images.append(renderer.render())
-    return images
+            yield renderer.render()
 
 
 def ground_below(model: mujoco.MjModel, qpos: np.ndarray) -> float:

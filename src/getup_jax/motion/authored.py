@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import jax
 import mujoco
 import numpy as np
-import yaml
 
 from getup_jax.motion import curves
 from getup_jax.motion.clips import Clip, GetUp, MotionError
+from getup_jax.motion.curve_file import check_start, read_curve_file
 from getup_jax.motion.features import NAMES, FeatureLinks, features
 from getup_jax.motion.keyframe_clip import clip_from_keyframes
 from getup_jax.motion.keyframe_file import read_keyframes
@@ -21,7 +20,6 @@ from getup_jax.paths import asset_path
 from getup_jax.physics.character import CharacterSpec
 
 _FIT_SAMPLES = 256  # of every curve, so that all are fitted at once
-_CURVE_KEYS = ("name", "strategy", "start", "durations", *NAMES)
 
 
 def load_authored(character: CharacterSpec) -> list[GetUp]:
@@ -45,26 +43,15 @@ def load_authored(character: CharacterSpec) -> list[GetUp]:
 def read_drawn(path: str | Path, references: Sequence[str]) -> list[GetUp]:
     """The get-ups of one curve file, one a duration, without a clip.
 
-    The file holds nine control points of each feature (angles in degrees) and names the
-    reference motion whose first pose it starts from. Raises MotionError.
+    The file names the reference motion whose first pose it starts from, and is called as its
+    style. Raises MotionError.
     """
     path = Path(path)
-    content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    if not isinstance(content, Mapping) or set(content) != set(_CURVE_KEYS):
-        found = sorted(content) if isinstance(content, Mapping) else content
-        raise MotionError(f"{path.name}: expected the keys {', '.join(_CURVE_KEYS)}, got {found}")
-    if content["name"] != path.stem:
-        raise MotionError(f"{path.name}: name: expected {path.stem!r}, got {content['name']!r}")
-    if content["start"] not in references:
-        raise MotionError(
-            f"{path.name}: start: expected one of {', '.join(references)}, got {content['start']!r}"
-        )
-    points = np.stack([_nine_points(content, name, path) for name in NAMES], axis=1)
-    points[:, 1:] = np.radians(points[:, 1:])
-    return [
-        GetUp(f"{path.stem}@{duration:g}", float(duration), points, None, content["strategy"])
-        for duration in content["durations"]
-    ]
+    curve = read_curve_file(path)
+    if curve.name != path.stem:
+        raise MotionError(f"{path.name}: name: expected {path.stem!r}, got {curve.name!r}")
+    check_start(curve, references)
+    return curve.getups()
 
 
 def clip_features(clips: Sequence[Clip], character: CharacterSpec) -> list[np.ndarray]:
@@ -81,16 +68,6 @@ def clip_features(clips: Sequence[Clip], character: CharacterSpec) -> list[np.nd
         positions[frame] = data.xpos[1:]
     values = jax.jit(functools.partial(features, FeatureLinks.of(character)))(positions, 0.0)
     return np.split(np.asarray(values), np.cumsum([len(clip.qpos) for clip in clips])[:-1])
-
-
-def _nine_points(content: Mapping[str, Any], name: str, path: Path) -> np.ndarray:
-    values = content[name]
-    numeric = isinstance(values, list) and all(isinstance(v, int | float) for v in values)
-    if not numeric or len(values) != curves.NUM_POINTS:
-        raise MotionError(
-            f"{path.name}: {name}: expected {curves.NUM_POINTS} numbers, got {values!r}"
-        )
-    return np.array(values, np.float64)
 
 
 def _fit(values: Sequence[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -49,10 +49,16 @@ Result = tuple[Clip, RetargetReport] | MotionError
 
 
 def retarget_files(
-    jobs: Sequence[Job], workers: int, done: Callable[[Path], None] = lambda path: None
+    jobs: Sequence[Job],
+    workers: int,
+    done: Callable[[Path], None] = lambda path: None,
+    apart: bool = False,
 ) -> list[Result]:
-    """One result a job, in order; a file that fails gives its error and stops no other."""
-    run = run_here if len(jobs) == 1 else _run_worker
+    """One result a job, in order; a file that fails gives its error and stops no other.
+
+    apart: in a process of its own also where there is but one, so that this one stays quick.
+    """
+    run = run_here if len(jobs) == 1 and not apart else _run_worker
 
     def one(job: Job) -> Result:
         try:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from getup_jax.config import MotionConfig
+from getup_jax.motion import curve_file
 from getup_jax.motion.cache import Job, read_npz, retarget_files
 from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.getups import cut_getup, find_getups
@@ -46,9 +47,12 @@ def load_motions(
     """
     authored = AUTHORED in config.source
     getups, poses = _authored(config, character) if authored else ([], [])
-    files = [file for source in config.source if source != AUTHORED for file in _files(source)]
+    drawn = [source for source in config.source if Path(source).suffix in curve_file.SUFFIXES]
+    others = [source for source in config.source if source not in (AUTHORED, *drawn)]
+    files = [file for source in others for file in _files(source)]
     clips, report = _clips(files, character, done)
     getups += _getups_of(clips, config.curves, character)
+    getups += _drawn(drawn, getups, character)
     _require_unique(getups)
     chosen = _choose(getups, config.curves)
     poses += [clip.qpos for clip in clips]
@@ -58,6 +62,18 @@ def load_motions(
     if config.mirror:
         stacked = np.concatenate([stacked, character.mirror(stacked)])
     return MotionLibrary(tuple(chosen), stacked, report)
+
+
+def _drawn(files: Sequence[str], getups: Sequence[GetUp], character: CharacterSpec) -> list[GetUp]:
+    """The styles in curve files: curves alone, but for those with a start pose of their own."""
+    known = tuple(getup.name for getup in getups if getup.clip is not None)
+    found: list[GetUp] = []
+    for file in files:
+        curve = curve_file.read_curve_file(Path(file).expanduser())
+        curve_file.check_start(curve, known)
+        own_pose = None if curve.pose is None else curve.start_clip({}, character)
+        found += curve.getups(own_pose)
+    return found
 
 
 def deepmimic_folder() -> Path:

@@ -1,0 +1,71 @@
+"""Curves out of a motion file that a page sends."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from getup_jax.editor.starts import reference_curve
+from getup_jax.motion.cache import Job, read_npz, retarget_files
+from getup_jax.motion.clips import Clip, GetUp, MotionError
+from getup_jax.motion.curve_file import DURATION_S, CurveFile
+from getup_jax.motion.getups import find_getups
+from getup_jax.motion.readers import SUFFIXES, ReadOptions
+from getup_jax.motion.retarget import RetargetSettings
+from getup_jax.physics.character import CharacterSpec
+
+_MOST = 20  # get-ups taken from one file
+_DIGITS = 6  # of the start pose
+
+
+def curves_of(name: str, content: bytes, character: CharacterSpec) -> list[CurveFile]:
+    """The curve of every get-up in a motion file, each with the start pose of its own."""
+    suffix = Path(name).suffix.lower()
+    known = (*SUFFIXES, ".npz")
+    if suffix not in known or suffix == ".amc":
+        takes = ", ".join(kind for kind in known if kind != ".amc")
+        raise MotionError(f"{name}: expected a file that ends in {takes}")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"{_plain(Path(name).stem)}{suffix}"
+        path.write_bytes(content)
+        clip = _clip(path, character)
+    _, getups = find_getups(clip, character)
+    if not getups:
+        raise MotionError(
+            f"{name}: no get-up in {clip.duration:.0f} s; expected a body that lies on the floor "
+            "and then stands"
+        )
+    good = [getup for getup in getups if DURATION_S[0] <= getup.duration <= DURATION_S[1]]
+    return [_curve(getup) for getup in good[:_MOST]]
+
+
+def _clip(path: Path, character: CharacterSpec) -> Clip:
+    if path.suffix == ".npz":
+        return read_npz(path, character)[0]
+    job = Job(path, character, ReadOptions(allow_short=True), RetargetSettings())
+    (result,) = retarget_files([job], workers=1, apart=True)
+    if isinstance(result, MotionError):
+        raise result
+    return result[0]
+
+
+def _curve(getup: GetUp) -> CurveFile:
+    assert getup.clip is not None
+    curve = reference_curve(getup)
+    name = _plain(getup.name)
+    return CurveFile(
+        name=name,
+        strategy=curve.strategy,
+        start=name,
+        durations=curve.durations,
+        values=curve.values,
+        pose=np.round(getup.clip.qpos[0].astype(np.float64), _DIGITS),
+    )
+
+
+def _plain(name: str) -> str:
+    """The name with nothing in it that a curve file's name may not have."""
+    return re.sub(r"[^\w.@:~ -]", "_", name)[:80] or "motion"

@@ -1,0 +1,152 @@
+"""What the page and the server say to each other over the WebSocket; every request is checked.
+
+A request is JSON text with a `type`; only `import` is binary, since it carries a file. Answers
+are JSON text too, but for frames and files: header length (uint32, little endian), JSON header,
+payload.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import re
+import struct
+from typing import Any
+
+import numpy as np
+
+from getup_jax.editor.export import FORMATS
+from getup_jax.editor.simulate import Frames, Motion
+from getup_jax.editor.starts import ANYWHERE, Place
+from getup_jax.motion.curve_file import CurveFile, parse
+from getup_jax.physics.terrain_map import REGIONS
+
+MAX_TEXT_BYTES = 128_000
+MAX_FILE_BYTES = 32_000_000
+SLOTS = 4  # variants that a page may show at once
+_FILE_NAME = re.compile(r"[\w ().+-]{1,100}")
+_LENGTH = struct.Struct("<I")
+
+
+class MessageError(ValueError):
+    """A message that the server does not answer; the text says why."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Request:
+    """What a page asks for."""
+
+    type: str  # simulate | save | load | export | import
+    number: int  # the page's own, comes back with the answer
+    slot: int = 0  # variant
+    curve: CurveFile | None = None  # simulate, save, export
+    place: Place = ANYWHERE
+    format: str = ""  # export
+    name: str = ""  # load, import: of the file
+    content: str | bytes = b""  # load, import
+
+
+def read(message: str | bytes) -> Request:
+    """The request in a message; MessageError or MotionError say what is wrong with it."""
+    content = b""
+    if isinstance(message, bytes):
+        text, content = _split(message)
+    else:
+        text = message
+    if len(text) > MAX_TEXT_BYTES:
+        raise MessageError(f"message: expected at most {MAX_TEXT_BYTES} bytes, got {len(text)}")
+    try:
+        said = json.loads(text)
+    except (ValueError, RecursionError):
+        raise MessageError("message: expected JSON") from None
+    if not isinstance(said, dict):
+        raise MessageError("message: expected a JSON object")
+    kind, binary = said.get("type"), isinstance(message, bytes)
+    if binary != (kind == "import") or kind not in ("simulate", "save", "load", "export", "import"):
+        raise MessageError(f"message: unknown type {str(kind)[:40]!r}")
+    number = _whole(said, "number", 2**31)
+    if kind in ("load", "import"):
+        return Request(kind, number, name=_file_name(said), content=content or _text(said))
+    curve = parse(said.get("curve"), "curve")
+    form = said.get("format", "")
+    if kind == "export" and form not in FORMATS:
+        raise MessageError(f"format: expected one of {', '.join(FORMATS)}")
+    place = Place(_whole(said, "region", len(REGIONS), 0), _whole(said, "place", 10_000, 0))
+    slot = _whole(said, "slot", SLOTS, 0)
+    return Request(kind, number, slot, curve, place, form)
+
+
+def pack(header: dict[str, Any], payload: bytes) -> bytes:
+    """A binary answer."""
+    text = json.dumps(header).encode()
+    # padded, so that the payload starts at a multiple of four bytes
+    text += b" " * (-len(text) % 4)
+    return _LENGTH.pack(len(text)) + text + payload
+
+
+def frames_message(request: Request, frames: Frames, total: int) -> bytes:
+    """Frames as float32: per frame 7 numbers a link, 3 features, and 1 while the episode runs."""
+    count = len(frames.qpos)
+    header = {"type": "frames", "number": request.number, "slot": request.slot}
+    header |= {"first": frames.first, "count": count, "total": total}
+    parts = [frames.links.reshape(count, -1), frames.features, frames.running[:, None]]
+    return pack(header, np.concatenate(parts, axis=1).astype("<f4").tobytes())
+
+
+def result_message(request: Request, motion: Motion, seconds: float) -> str:
+    """Verdict and scores of a whole motion, and how long it took the server."""
+    success = motion.scores["success"] == 1.0
+    scores = {k: v if math.isfinite(v) else None for k, v in motion.scores.items()}
+    header = {"type": "result", "number": request.number, "slot": request.slot}
+    header |= {"success": success, "verdict": verdict(motion), "scores": scores}
+    gap = math.degrees(motion.start_gap_rad)
+    return json.dumps({**header, "start_gap_deg": gap, "server_s": seconds})
+
+
+def verdict(motion: Motion) -> str:
+    """How the episode ended, in a few words."""
+    if motion.scores["success"] == 1.0:
+        return f"stands after {motion.scores['stand_time_s']:.1f} s"
+    ended = int(motion.frames.running.sum())
+    if ended == len(motion.time):
+        return "does not stand at the end"
+    recent = motion.task_reward[max(0, ended - 3) : ended]
+    cause = "too far from the curves" if recent.max() < 0.1 else "head on the floor"
+    return f"fails at {motion.time[ended - 1]:.1f} s: {cause}"
+
+
+def _split(message: bytes) -> tuple[str, bytes]:
+    if len(message) < _LENGTH.size:
+        raise MessageError("message: expected a header and a file")
+    (length,) = _LENGTH.unpack_from(message)
+    end = _LENGTH.size + length
+    if length > MAX_TEXT_BYTES or end > len(message):
+        raise MessageError("message: expected a header and a file")
+    if len(message) - end > MAX_FILE_BYTES:
+        raise MessageError(f"file: expected at most {MAX_FILE_BYTES // 1_000_000} MB")
+    try:
+        return message[_LENGTH.size : end].decode(), message[end:]
+    except UnicodeDecodeError:
+        raise MessageError("message: expected a header in UTF-8") from None
+
+
+def _whole(said: dict[str, Any], key: str, end: int, default: int | None = None) -> int:
+    value = said.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < end:
+        raise MessageError(f"{key}: expected a whole number from 0 to {end - 1}")
+    return value
+
+
+def _file_name(said: dict[str, Any]) -> str:
+    name = said.get("name")
+    if not isinstance(name, str) or not _FILE_NAME.fullmatch(name) or name.startswith("."):
+        raise MessageError("name: expected the name of a file without its folder")
+    return name
+
+
+def _text(said: dict[str, Any]) -> str:
+    text = said.get("text", "")
+    if not isinstance(text, str):
+        raise MessageError("text: expected the text of a file")
+    return text

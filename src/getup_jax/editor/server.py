@@ -1,0 +1,250 @@
+"""The server of `getup-edit`: the page's files and one WebSocket a page, in one event loop.
+
+The loop only passes messages on. Simulations run in the session's thread, slow work (imports,
+exports) in threads of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import errno
+import itertools
+import json
+import signal
+import sys
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
+
+from getup_jax import checkpoint
+from getup_jax.checkpoint import LoadedPolicy
+from getup_jax.editor import messages
+from getup_jax.editor.export import export
+from getup_jax.editor.imports import curves_of
+from getup_jax.editor.messages import Request
+from getup_jax.editor.scene import describe
+from getup_jax.editor.session import Session, error_message
+from getup_jax.editor.simulate import Simulator
+from getup_jax.editor.site import Site
+from getup_jax.motion.curve_file import dump, parse_text
+
+_MAX_BYTES = messages.MAX_FILE_BYTES + messages.MAX_TEXT_BYTES
+_MAX_PAGES = 16
+_MAX_UNSENT = 4000  # messages that wait for a page that does not read them
+_SLOW = 2  # imports and exports at once
+
+Build = Callable[[Callable[[str], None]], tuple[Session, dict[str, Any]]]
+
+
+class EditorError(ValueError):
+    """The editor cannot be served; the text says why and what to do."""
+
+
+def edit_command(args: argparse.Namespace) -> int:
+    """The command line of `getup-edit`; returns the exit code."""
+    loaded = checkpoint.load_policy(args.ckpt)
+
+    def build(log: Callable[[str], None]) -> tuple[Session, dict[str, Any]]:
+        return build_session(loaded, log)
+
+    app = App(build, Site.of(args.token))
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(app.run(args.host, args.port))
+    return 0
+
+
+def build_session(
+    loaded: LoadedPolicy, log: Callable[[str], None]
+) -> tuple[Session, dict[str, Any]]:
+    """The session of a policy, compiled, and what pages must know of it."""
+    simulator = Simulator.build(loaded, log)
+    scene = describe(simulator, loaded)
+    log("compiling the episode ...")
+    simulator.finish(messages.parse(scene["curves"][0], "curve"))
+    return Session(simulator), scene
+
+
+class App:
+    """All pages and the session that they share."""
+
+    def __init__(self, build: Build, site: Site) -> None:
+        self._build, self._site = build, site
+        self._pages = itertools.count()
+        self._boxes: dict[int, Outbox] = {}
+        self._session: Session | None = None
+        self._hello = _status("starting", "loading")
+        self._slow = asyncio.Semaphore(_SLOW)
+
+    async def run(self, host: str, port: int, ready: Callable[[str], None] = print) -> None:
+        """Serve until the task is cancelled or SIGTERM comes."""
+        stop = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
+            loop.add_signal_handler(signal.SIGTERM, stop.set)
+        async with await self._listen(host, port) as server:
+            ready(self._address(server, host))
+            building = asyncio.create_task(self._start(loop))
+            stopping = asyncio.create_task(stop.wait())
+            try:
+                await asyncio.wait({building, stopping}, return_when=asyncio.FIRST_COMPLETED)
+                if building.done():
+                    building.result()  # raises what went wrong
+                    ready("ready; Ctrl-C ends it")
+                await stop.wait()
+            finally:
+                if self._session is not None:
+                    self._session.stop()
+
+    async def _listen(self, host: str, port: int) -> Server:
+        try:
+            return await serve(
+                self._page,
+                host,
+                port,
+                process_request=lambda _, request: self._site.answer(request),
+                max_size=_MAX_BYTES,
+                compression=None,
+                server_header=None,
+                open_timeout=10,
+            )
+        except OSError as error:
+            if error.errno == errno.EADDRINUSE:
+                raise EditorError(
+                    f"port {port}: in use on {host}; give another one with --port, or 0 for any"
+                ) from None
+            raise EditorError(
+                f"cannot listen on {host}, port {port}: {error.strerror or error}; "
+                "choose another --host or --port"
+            ) from None
+
+    def _address(self, server: Server, host: str) -> str:
+        port = next(iter(server.sockets)).getsockname()[1]
+        name = f"[{host}]" if ":" in host else host
+        query = f"/?token={self._site.token}" if self._site.token else "/"
+        return f"getup-edit: http://{name}:{port}{query}"
+
+    async def _start(self, loop: asyncio.AbstractEventLoop) -> None:
+        def log(text: str) -> None:
+            print(text, file=sys.stderr, flush=True)
+            loop.call_soon_threadsafe(self._announce, _status("starting", text))
+
+        try:
+            self._session, scene = await asyncio.to_thread(self._build, log)
+        except Exception as error:
+            self._announce(_status("failed", f"{type(error).__name__}: {error}"))
+            await asyncio.sleep(0.2)  # so that pages hear of it
+            raise
+        self._announce(json.dumps({"type": "ready", "scene": scene}))
+
+    def _announce(self, message: str) -> None:
+        self._hello = message
+        for box in self._boxes.values():
+            box.put(message)
+
+    async def _page(self, connection: ServerConnection) -> None:
+        """One page from its first message to its last."""
+        if len(self._boxes) >= _MAX_PAGES:
+            await connection.close(1013, f"at most {_MAX_PAGES} pages at once")
+            return
+        page, box = next(self._pages), Outbox(asyncio.get_running_loop())
+        self._boxes[page] = box
+        box.put(self._hello)
+        sender = asyncio.create_task(box.drain(connection))
+        tasks: set[asyncio.Task[None]] = set()
+        try:
+            async for message in connection:
+                self._receive(page, message, box, tasks)
+        except ConnectionClosed:
+            pass
+        finally:
+            del self._boxes[page]
+            if self._session is not None:
+                self._session.forget(page)
+            for task in (sender, *tasks):
+                task.cancel()
+
+    def _receive(
+        self, page: int, message: str | bytes, box: Outbox, tasks: set[asyncio.Task[None]]
+    ) -> None:
+        """Pass a request on; what is wrong with it is said, and nothing else happens."""
+        request = None
+        try:
+            request = messages.read(message)
+            if self._session is None:
+                raise messages.MessageError("not ready yet; ask again when the page says ready")
+            if request.type == "simulate":
+                self._session.submit(page, request, box.put_from_thread)
+                return
+            if len(tasks) >= _SLOW:
+                raise messages.MessageError("busy with earlier files; try again in a moment")
+        except ValueError as error:
+            box.put(error_message(request, error))
+            return
+        task = asyncio.create_task(self._answer_later(request, self._session, box))
+        tasks.add(task)
+        task.add_done_callback(tasks.discard)
+
+    async def _answer_later(self, request: Request, session: Session, box: Outbox) -> None:
+        try:
+            async with self._slow:
+                box.put(await asyncio.to_thread(answer, request, session))
+        except Exception as error:  # told to the page, the server lives
+            if not type(error).__module__.startswith("getup_jax."):
+                warnings.warn(f"{request.type}: {type(error).__name__}: {error}", stacklevel=2)
+            box.put(error_message(request, error))
+
+
+def answer(request: Request, session: Session) -> str | bytes:
+    """The answer to a request that may take a while; runs in a thread of its own."""
+    header: dict[str, Any] = {"number": request.number}
+    if request.type == "load":
+        curve = parse_text(request.content, request.name)
+        curve.start_clip(session.simulator.starts.clips, session.simulator.character)
+        return json.dumps({"type": "curves", **header, "curves": [curve.plain()]})
+    if request.type == "import":
+        assert isinstance(request.content, bytes)
+        curves = curves_of(request.name, request.content, session.simulator.character)
+        return json.dumps({"type": "curves", **header, "curves": [c.plain() for c in curves]})
+    assert request.curve is not None
+    if request.type == "save":
+        name = f"{request.curve.name}.yaml"
+        return messages.pack({"type": "file", **header, "name": name}, dump(request.curve).encode())
+    content = export(session.motion(request), session.simulator.character, request.format)
+    name = f"{request.curve.name}.{request.format}"
+    return messages.pack({"type": "file", **header, "name": name}, content)
+
+
+class Outbox:
+    """What a page is still to be sent; a page that reads too slowly is closed."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._queue: asyncio.Queue[str | bytes] = asyncio.Queue()
+
+    def put(self, message: str | bytes) -> None:
+        """Send it after what waits already; from the loop's own thread."""
+        self._queue.put_nowait(message)
+
+    def put_from_thread(self, message: str | bytes) -> None:
+        """The same from any thread; nothing happens where the loop has ended."""
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self.put, message)
+
+    async def drain(self, connection: ServerConnection) -> None:
+        """Send for as long as the page is there."""
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                message = await self._queue.get()
+                if self._queue.qsize() > _MAX_UNSENT:
+                    await connection.close(1013, "the page reads too slowly")
+                    return
+                await connection.send(message)
+
+
+def _status(state: str, text: str) -> str:
+    return json.dumps({"type": "status", "state": state, "text": text})

@@ -1,0 +1,143 @@
+"""The worker behind the pages: it simulates one curve after the other, and the newest wins."""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+import json
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from getup_jax.editor import messages
+from getup_jax.editor.messages import Request
+from getup_jax.editor.scene import ground
+from getup_jax.editor.simulate import Frames, Motion, Simulator
+
+_KEPT = 16  # motions kept for exports
+Send = Callable[[str | bytes], None]  # may be called from any thread
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Job:
+    """A simulation that a page waits for."""
+
+    key: tuple[int, int]  # page and variant
+    request: Request
+    send: Send
+
+
+class Session:
+    """One thread that simulates; pages submit and may leave at any time.
+
+    A job replaces the one of the same page and variant, also one that is being simulated: that
+    stops after the chunk at hand. Others wait in the order in which they came.
+    """
+
+    def __init__(self, simulator: Simulator) -> None:
+        self.simulator = simulator
+        self._wake = threading.Condition()
+        self._waiting: collections.OrderedDict[tuple[int, int], Job] = collections.OrderedDict()
+        self._current: Job | None = None
+        self._motions: collections.OrderedDict[str, Motion] = collections.OrderedDict()
+        self._compute = threading.Lock()  # the one who simulates
+        self._stopped = False
+        self._thread = threading.Thread(target=self._work, name="simulate", daemon=True)
+        self._thread.start()
+
+    def submit(self, page: int, request: Request, send: Send) -> None:
+        """Simulate as soon as possible; frames and then the result go to `send`."""
+        with self._wake:
+            key = (page, request.slot)
+            self._waiting[key] = Job(key, request, send)
+            if self._current is not None and self._current.key == key:
+                self._current = None
+            self._wake.notify()
+
+    def forget(self, page: int) -> None:
+        """The page is gone."""
+        with self._wake:
+            for key in [key for key in self._waiting if key[0] == page]:
+                del self._waiting[key]
+            if self._current is not None and self._current.key[0] == page:
+                self._current = None
+
+    def motion(self, request: Request) -> Motion:
+        """The motion of a request: the one that was shown last for it, or simulated now."""
+        key = _key(request)
+        with self._wake:
+            if key in self._motions:
+                return self._motions[key]
+        assert request.curve is not None
+        with self._compute:
+            motion = self.simulator.finish(request.curve, request.place)
+        self._keep(key, motion)
+        return motion
+
+    def stop(self) -> None:
+        """End the thread after the chunk at hand."""
+        with self._wake:
+            self._stopped, self._current = True, None
+            self._wake.notify()
+        self._thread.join(timeout=10)
+
+    def _work(self) -> None:
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._waiting or self._stopped)
+                if self._stopped:
+                    return
+                _, job = self._waiting.popitem(last=False)
+                self._current = job
+            try:
+                with self._compute:
+                    self._simulate(job)
+            except Exception as error:  # a job that fails stops no other
+                job.send(error_message(job.request, error))
+
+    def _simulate(self, job: Job) -> None:
+        begin, curve = time.perf_counter(), job.request.curve
+        assert curve is not None
+        total = self.simulator.steps(curve)
+        for part in self.simulator.run(curve, job.request.place):
+            with self._wake:
+                if self._current is not job:
+                    return
+            if isinstance(part, Frames):
+                if part.first == 0:
+                    self._send_ground(job, part)
+                job.send(messages.frames_message(job.request, part, total))
+            else:
+                self._keep(_key(job.request), part)
+                seconds = time.perf_counter() - begin
+                job.send(messages.result_message(job.request, part, seconds))
+
+    def _send_ground(self, job: Job, frames: Frames) -> None:
+        """The ground around the start comes before the first frames; a plane needs no words."""
+        around = ground(self.simulator, frames.links[0, 0, :2])
+        if around is not None:
+            header = {"type": "ground", "slot": job.request.slot, "number": job.request.number}
+            job.send(json.dumps({**header, **around}))
+
+    def _keep(self, key: str, motion: Motion) -> None:
+        with self._wake:
+            self._motions[key] = motion
+            self._motions.move_to_end(key)
+            while len(self._motions) > _KEPT:
+                self._motions.popitem(last=False)
+
+
+def error_message(request: Request | None, error: Exception) -> str:
+    """What a page is told; errors that are not for users keep their type's name."""
+    known = type(error).__module__.startswith("getup_jax.")
+    text = str(error) if known else f"{type(error).__name__}: {error}"
+    answer: dict[str, Any] = {"type": "error", "text": text[:2000]}
+    if request is not None:
+        answer |= {"number": request.number, "of": request.type}
+    return json.dumps(answer)
+
+
+def _key(request: Request) -> str:
+    assert request.curve is not None
+    return json.dumps([request.curve.plain(), dataclasses.astuple(request.place)])

@@ -1,0 +1,90 @@
+"""The page's files and who may ask for them: a fixed table of names, and checks of the sender."""
+
+from __future__ import annotations
+
+import dataclasses
+import hmac
+import urllib.parse
+from http import HTTPStatus
+from pathlib import Path
+
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from getup_jax.editor.options import is_loopback
+
+PAGE = Path(__file__).parent / "page"
+SOCKET = "/socket"
+_TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+}
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Site:
+    """What is served, and to whom."""
+
+    files: dict[str, tuple[bytes, str]]  # path of the address -> content and type
+    token: str | None  # what the page's address and its socket must say; None: nothing
+
+    @classmethod
+    def of(cls, token: str | None) -> Site:
+        """The files of the package, read once: no name of a request reaches the disk."""
+        files = {}
+        for path in sorted(PAGE.rglob("*")):
+            if path.suffix in _TYPES:
+                name = f"/{path.relative_to(PAGE).as_posix()}"
+                files[name] = (path.read_bytes(), _TYPES[path.suffix])
+        files["/"] = files.pop("/index.html")
+        return cls(files, token)
+
+    def answer(self, request: Request) -> Response | None:
+        """The file or the refusal; None lets a WebSocket in."""
+        address = urllib.parse.urlsplit(request.path)
+        refusal = self._refusal(request.headers, address)
+        if refusal is not None:
+            return _response(HTTPStatus.FORBIDDEN, refusal.encode(), "text/plain; charset=utf-8")
+        if address.path == SOCKET:
+            return None
+        found = self.files.get(address.path)
+        if found is None:
+            return _response(HTTPStatus.NOT_FOUND, b"not found\n", "text/plain; charset=utf-8")
+        return _response(HTTPStatus.OK, *found)
+
+    def _refusal(self, headers: Headers, address: urllib.parse.SplitResult) -> str | None:
+        """Why a request is not answered."""
+        host = (headers.get_all("Host") or [""])[0]
+        name = urllib.parse.urlsplit(f"//{host}").hostname or ""
+        if self.token is None and not is_loopback(name):
+            # a name of another site that was made to point here
+            return "Host: expected localhost or 127.0.0.1\n"
+        origins = headers.get_all("Origin")
+        if any(origin not in (f"http://{host}", f"https://{host}") for origin in origins):
+            return "Origin: the editor answers its own page only\n"
+        if self.token is not None and address.path in ("/", SOCKET):
+            said = urllib.parse.parse_qs(address.query).get("token", [""])[0]
+            if not hmac.compare_digest(said.encode(), self.token.encode()):
+                return "token: open the address that getup-edit printed\n"
+        return None
+
+
+def _response(status: HTTPStatus, body: bytes, kind: str) -> Response:
+    headers = Headers(
+        {
+            "Content-Type": kind,
+            "Content-Length": str(len(body)),
+            "Cache-Control": "no-store",
+            "Content-Security-Policy": _POLICY,
+            "X-Content-Type-Options": "nosniff",
+            "Referrer-Policy": "no-referrer",
+            "Connection": "close",
+        }
+    )
+    return Response(status.value, status.phrase, headers, body)
