@@ -34,6 +34,7 @@ def describe(simulator: Simulator, loaded: LoadedPolicy) -> dict[str, Any]:
     """Plain values for JSON."""
     task, starts = simulator.task, simulator.starts
     bands = strategy_curves(task.getups, simulator.character)
+    references = {getup.name: reference_curve(getup) for getup in task.getups}
     return {
         "policy": {"path": str(loaded.path), "steps": loaded.metadata.get("steps", 0)},
         "control_dt": simulator.control_dt,
@@ -43,9 +44,17 @@ def describe(simulator: Simulator, loaded: LoadedPolicy) -> dict[str, Any]:
         "shapes": shapes(simulator.character),
         "links": simulator.character.link_names,
         "starts": [
-            {"name": name, "lies": lies(clip, simulator.character)}
+            {
+                "name": name,
+                "lies": lies(clip, simulator.character),
+                "first": references[name].values[0].tolist(),
+            }
             for name, clip in starts.clips.items()
         ],
+        "mirror": {
+            "joint": simulator.character.mirror_joint.tolist(),
+            "sign": simulator.character.mirror_sign.tolist(),
+        },
         "mirrored": None if starts.places else curve_file.MIRRORED,
         "curves": [curve.plain() for curve in library_curves(simulator)],
         "bands": {

@@ -1,0 +1,53 @@
+// The character as three.js meshes: a group a link, posed by positions and quaternions.
+
+import { BoxGeometry, CapsuleGeometry, Color, Group, Mesh, MeshStandardMaterial, SphereGeometry } from "./vendor/three.min.js";
+
+export const TINTS = ["#3f74b5", "#b8862b", "#8a55ad", "#2f8f6b"]; // of the variants
+
+export class Body {
+  constructor(shapes, links) {
+    this.group = new Group();
+    this.links = Array.from({ length: links }, () => new Group());
+    this.group.add(...this.links);
+    this.materials = [];
+    for (const shape of shapes) this.links[shape.link].add(this.mesh(shape));
+  }
+
+  mesh(shape) {
+    const material = new MeshStandardMaterial({ color: new Color(...shape.colour).convertSRGBToLinear(), roughness: 0.75 });
+    material.userData.own = material.color.clone();
+    this.materials.push(material);
+    const mesh = new Mesh(geometry(shape), material);
+    mesh.position.set(...shape.position);
+    const [w, x, y, z] = shape.quaternion;
+    mesh.quaternion.set(x, y, z, w);
+    mesh.castShadow = true;
+    return mesh;
+  }
+
+  // A ghost is see-through and in the tint of its variant.
+  dress(ghost, slot) {
+    for (const material of this.materials) {
+      material.transparent = ghost;
+      material.opacity = ghost ? 0.32 : 1;
+      material.depthWrite = !ghost;
+      if (ghost) material.color.set(TINTS[slot]);
+      else material.color.copy(material.userData.own);
+    }
+    for (const link of this.links) for (const mesh of link.children) mesh.castShadow = !ghost;
+  }
+
+  pose(values) {
+    this.links.forEach((link, i) => {
+      const [x, y, z, qw, qx, qy, qz] = values.subarray(7 * i, 7 * i + 7);
+      link.position.set(x, y, z);
+      link.quaternion.set(qx, qy, qz, qw);
+    });
+  }
+}
+
+function geometry({ kind, size }) {
+  if (kind === "sphere") return new SphereGeometry(size[0], 24, 16);
+  if (kind === "box") return new BoxGeometry(2 * size[0], 2 * size[1], 2 * size[2]);
+  return new CapsuleGeometry(size[0], 2 * size[1], 8, 20).rotateX(Math.PI / 2); // MuJoCo's lie along z
+}

@@ -1,0 +1,177 @@
+// The 3-D view: ground, the variants' bodies, light, and a camera that orbits and follows.
+
+import {
+  BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Fog, GridHelper, HemisphereLight, Mesh,
+  MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, PlaneGeometry, Scene, Vector3, WebGLRenderer,
+} from "./vendor/three.min.js";
+import { Body } from "./body.js";
+
+const LOOK_AT_M = 0.6; // above the ground
+
+export class View {
+  constructor(canvas, scene) {
+    this.canvas = canvas;
+    this.spec = scene;
+    this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = PCFShadowMap;
+    this.scene = new Scene();
+    this.camera = new PerspectiveCamera(38, 1, 0.05, 80);
+    this.camera.up.set(0, 0, 1);
+    this.orbit = { azimuth: 0.6, elevation: 0.28, distance: 4.2 };
+    this.target = new Vector3(0, 0, LOOK_AT_M);
+    this.follow = true;
+    this.bodies = [];
+    this.light();
+    this.theme();
+    this.listen();
+    new ResizeObserver(() => { this.resize(); this.dirty = true; }).observe(canvas);
+    this.resize();
+  }
+
+  light() {
+    this.scene.add(new HemisphereLight("#ffffff", "#9aa3ad", 1.5));
+    this.sun = new DirectionalLight("#ffffff", 2.2);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(1024, 1024);
+    Object.assign(this.sun.shadow.camera, { left: -2.5, right: 2.5, top: 2.5, bottom: -2.5, near: 1, far: 12 });
+    this.sun.shadow.bias = -0.0005;
+    this.scene.add(this.sun, this.sun.target);
+  }
+
+  // Colours of the page's theme.
+  theme() {
+    const style = getComputedStyle(document.documentElement);
+    const colour = (name) => style.getPropertyValue(name).trim();
+    this.scene.background = new Color(colour("--sky"));
+    this.scene.fog = new Fog(colour("--sky"), 9, 26);
+    this.colours = { floor: colour("--floor"), line: colour("--floor-line") };
+    this.setGround(this.ground ?? null);
+  }
+
+  setGround(ground) {
+    this.ground = ground;
+    if (this.floor) {
+      this.scene.remove(...this.floor);
+      for (const part of this.floor) { part.geometry.dispose(); part.material.dispose(); }
+    }
+    const material = new MeshStandardMaterial({ color: this.colours.floor, roughness: 1, side: DoubleSide, flatShading: Boolean(ground) });
+    if (ground) {
+      this.floor = [new Mesh(landscape(ground), material)];
+    } else {
+      const grid = new GridHelper(60, 60, this.colours.line, this.colours.line).rotateX(Math.PI / 2);
+      grid.position.z = 0.002;
+      this.floor = [new Mesh(new PlaneGeometry(60, 60), material), grid];
+    }
+    this.floor[0].receiveShadow = true;
+    this.scene.add(...this.floor);
+    this.dirty = true;
+  }
+
+  // One body a variant; the active one is solid, the others are ghosts.
+  arrange(count, active) {
+    while (this.bodies.length < count) {
+      const body = new Body(this.spec.shapes, this.spec.links.length);
+      body.group.visible = false;
+      this.bodies.push(body);
+      this.scene.add(body.group);
+    }
+    this.bodies.forEach((body, slot) => {
+      if (slot >= count) body.group.visible = false;
+      body.dress(slot !== active, slot);
+    });
+    this.dirty = true;
+  }
+
+  pose(slot, values) {
+    const body = this.bodies[slot];
+    body.group.visible = values !== null;
+    if (values) body.pose(values);
+    this.dirty = true;
+  }
+
+  // Looks at a lying body from its side.
+  face(values, neck) {
+    const dx = values[7 * neck] - values[0], dy = values[7 * neck + 1] - values[1];
+    if (Math.hypot(dx, dy) > 0.1) this.orbit.azimuth = Math.atan2(dy, dx) - 0.42 * Math.PI;
+    this.centre(values, 1);
+  }
+
+  centre(values, share) {
+    const level = this.ground ? heightAt(this.ground, values[0], values[1]) : 0;
+    this.target.lerp(new Vector3(values[0], values[1], level + LOOK_AT_M), share);
+    this.dirty = true;
+  }
+
+  draw() {
+    if (!this.dirty) return;
+    this.dirty = false;
+    const { azimuth, elevation, distance } = this.orbit;
+    const flat = distance * Math.cos(elevation);
+    this.camera.position.set(
+      this.target.x + flat * Math.cos(azimuth), this.target.y + flat * Math.sin(azimuth),
+      this.target.z + distance * Math.sin(elevation),
+    );
+    this.camera.lookAt(this.target);
+    this.sun.position.copy(this.target).add(new Vector3(1.6, -1.2, 4.5));
+    this.sun.target.position.copy(this.target);
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / Math.max(height, 1);
+    this.camera.updateProjectionMatrix();
+  }
+
+  turn(azimuth, elevation, zoom = 1) {
+    this.orbit.azimuth += azimuth;
+    this.orbit.elevation = Math.min(Math.max(this.orbit.elevation + elevation, -0.05), 1.5);
+    this.orbit.distance = Math.min(Math.max(this.orbit.distance * zoom, 1), 15);
+    this.dirty = true;
+  }
+
+  listen() {
+    const { canvas } = this;
+    canvas.addEventListener("pointermove", (event) => {
+      if (event.buttons & 1) this.turn(-0.008 * event.movementX, 0.008 * event.movementY);
+    });
+    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.turn(0, 0, Math.exp(0.0012 * event.deltaY));
+    }, { passive: false });
+    canvas.addEventListener("keydown", (event) => {
+      const turns = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.08], ArrowDown: [0, -0.08], "+": [0, 0, 0.9], "-": [0, 0, 1.1] };
+      if (event.key in turns) {
+        event.preventDefault();
+        this.turn(...turns[event.key]);
+      }
+    });
+  }
+}
+
+// Height field triangles as MuJoCo cuts the cells: from the lower to the upper corner in x and y.
+function landscape({ origin, step, points, heights }) {
+  const position = new Float32Array(points * points * 3);
+  const index = [];
+  for (let row = 0; row < points; row++) {
+    for (let column = 0; column < points; column++) {
+      const i = row * points + column;
+      position.set([origin[0] + column * step, origin[1] + row * step, heights[i]], 3 * i);
+      if (row + 1 < points && column + 1 < points) index.push(i, i + 1, i + points + 1, i, i + points + 1, i + points);
+    }
+  }
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(position, 3));
+  geometry.setIndex(index);
+  geometry.computeVertexNormals();
+  return geometry;
+}
+
+export function heightAt({ origin, step, points, heights }, x, y) {
+  const clamp = (v) => Math.min(Math.max(Math.round(v), 0), points - 1);
+  return heights[clamp((y - origin[1]) / step) * points + clamp((x - origin[0]) / step)];
+}
