@@ -97,6 +97,7 @@ class App:
                     ready("ready; Ctrl-C ends it")
                 await stop.wait()
             finally:
+                stopping.cancel()
                 if self._session is not None:
                     self._session.stop()
 

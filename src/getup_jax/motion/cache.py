@@ -12,6 +12,8 @@ import json
 import pickle
 import subprocess
 import sys
+import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -132,7 +134,7 @@ def read_npz(file: Path, character: CharacterSpec) -> tuple[Clip, RetargetReport
     try:
         with np.load(file) as data:
             values = {name: data[name] for name in data.files}
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise MotionError(f"{file}: not a clip: {error}") from None
     needed = {"qpos", "fps", "name", "source", "joints", "report"}
     if not needed <= values.keys():

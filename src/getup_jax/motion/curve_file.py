@@ -38,8 +38,11 @@ DURATION_S = (0.5, 20.0)
 # points past what a body can do bend it towards there.
 LIMITS = ((-0.5, 2.5), (-90.0, 270.0), (-90.0, 270.0))
 _MAX_BYTES = 64_000
+_MOST_LISTS = 50  # in a file, comments included
 _MAX_DURATIONS = 16
 _NAME = re.compile(r"[\w.@:~ -]{1,80}")
+_SHORT = reprlib.Repr()  # of what came instead
+_SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxstring = 2, 4, 100
 _COMMENTS = {
     "start": "the motion whose first pose it starts from",
     "durations": "s",
@@ -110,8 +113,10 @@ def parse_text(text: str | bytes, where: str) -> CurveFile:
     """The style in the text of a file that is called `where`."""
     if len(text) > _MAX_BYTES:
         raise MotionError(f"{where}: expected at most {_MAX_BYTES} bytes, got {len(text)}")
+    nested = text.count(b"[" if isinstance(text, bytes) else "[")
     try:
-        content = yaml.safe_load(text)
+        # a deep nest takes the parser long
+        content = yaml.safe_load(text) if nested <= _MOST_LISTS else None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         line = getattr(getattr(error, "problem_mark", None), "line", None)
         place = "" if line is None else f", line {line + 1}"
@@ -122,12 +127,12 @@ def parse_text(text: str | bytes, where: str) -> CurveFile:
 def parse(content: Any, where: str) -> CurveFile:
     """The style in the content of a file, however it came; every value is checked."""
     if not isinstance(content, Mapping) or set(content) - {"pose"} != set(KEYS):
-        found = ", ".join(map(str, content)) if isinstance(content, Mapping) else content
-        raise MotionError(
-            f"{where}: expected the keys {', '.join(KEYS)}, got {reprlib.repr(found)}"
+        found = (
+            ", ".join(str(key)[:40] for key in content) if isinstance(content, Mapping) else content
         )
+        raise MotionError(f"{where}: expected the keys {', '.join(KEYS)}, got {_SHORT.repr(found)}")
     for key in ("name", "strategy", "start"):
-        if not isinstance(content[key], str) or not _NAME.fullmatch(content[key] or " "):
+        if not isinstance(content[key], str) or not _NAME.fullmatch(content[key]):
             raise _wrong(where, key, "up to 80 letters, digits, spaces and _-.@:~", content[key])
     durations = _numbers(content["durations"], where, "durations", DURATION_S)
     if not 1 <= len(durations) <= _MAX_DURATIONS:
@@ -186,7 +191,7 @@ def _numbers(content: Any, where: str, key: str, limits: tuple[float, float]) ->
 
 
 def _wrong(where: str, key: str, expected: str, got: Any) -> MotionError:
-    return MotionError(f"{where}: {key}: expected {expected}, got {reprlib.repr(got)}")
+    return MotionError(f"{where}: {key}: expected {expected}, got {_SHORT.repr(got)}")
 
 
 def _unknown_start(name: str, start: str, known: Sequence[str]) -> MotionError:

@@ -29,8 +29,10 @@ export class Body {
   dress(ghost, slot) {
     for (const material of this.materials) {
       material.transparent = ghost;
-      material.opacity = ghost ? 0.32 : 1;
-      material.depthWrite = !ghost;
+      material.opacity = ghost ? 0.4 : 1;
+      material.polygonOffset = ghost; // behind the solid body where both are at one place
+      material.polygonOffsetFactor = 2;
+      material.polygonOffsetUnits = 8;
       if (ghost) material.color.set(TINTS[slot]);
       else material.color.copy(material.userData.own);
     }

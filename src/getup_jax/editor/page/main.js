@@ -244,7 +244,7 @@ function redraw() {
   panels.draw();
 }
 
-function showFrame() {
+function showFrame(seconds) {
   if (!scene) return;
   if (redraw.due) redraw();
   panels.drawTime();
@@ -255,6 +255,7 @@ function showFrame() {
   });
   const shown = motions[store.active];
   if (view.follow && shown?.count) view.centre(shown.pose(player.frame(shown, scene.control_dt)), 0.12);
+  view.pace(seconds);
   view.draw();
   if (stripDue && shown?.result) {
     stripDue = false;

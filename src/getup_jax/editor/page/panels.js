@@ -150,7 +150,7 @@ class Panel {
     const unit = make("tspan", { class: "unit" });
     unit.textContent = ` ${this.kind.unit}`;
     title.append(unit);
-    parts.push(title, text(this.width - RIGHT, 15, HINTS[this.name] ?? "seconds below", { "text-anchor": "end" }));
+    parts.push(title, text(this.width - RIGHT, 15, HINTS[this.name] ?? "blue target · orange achieved · time in s", { "text-anchor": "end" }));
     return parts;
   }
 

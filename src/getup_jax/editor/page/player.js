@@ -48,7 +48,7 @@ export class Player {
     }
     this.elements.scrub.value = this.time / Math.max(this.model.span(), 1e-6);
     this.elements.clock.textContent = `${this.time.toFixed(2)} s`;
-    this.onFrame();
+    this.onFrame(seconds);
   }
 
   // The frame of a motion at this time, as far as it has arrived.

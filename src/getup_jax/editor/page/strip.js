@@ -6,6 +6,7 @@ import { heightAt } from "./view.js";
 
 const POSES = 7;
 const SPACING_M = 1.8;
+const BEFORE_M = 1.15, AFTER_M = 0.7; // room for a lying first pose and a standing last one
 const HEIGHT_M = 1.95;
 
 export class Strip {
@@ -52,7 +53,7 @@ export class Strip {
       const level = motion.ground ? heightAt(motion.ground, values[0], values[1]) : 0;
       body.group.position.set(-values[0], -values[1], -level);
       place.rotation.z = -azimuth - Math.PI / 2;
-      place.position.x = ((i + 0.5) / POSES - 0.5) * across;
+      place.position.x = BEFORE_M - across / 2 + (i / (POSES - 1)) * (across - BEFORE_M - AFTER_M);
       body.group.visible = true;
     });
     this.renderer.render(this.scene, this.camera);

@@ -7,6 +7,7 @@ import {
 import { Body } from "./body.js";
 
 const LOOK_AT_M = 0.6; // above the ground
+const SLOW_S = 0.07; // a frame; drawn more plainly when slower than this
 
 export class View {
   constructor(canvas, scene) {
@@ -16,7 +17,7 @@ export class View {
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.scene = new Scene();
-    this.camera = new PerspectiveCamera(38, 1, 0.05, 80);
+    this.camera = new PerspectiveCamera(38, 1, 0.1, 60);
     this.camera.up.set(0, 0, 1);
     this.orbit = { azimuth: 0.6, elevation: 0.28, distance: 4.2 };
     this.target = new Vector3(0, 0, LOOK_AT_M);
@@ -56,11 +57,12 @@ export class View {
       for (const part of this.floor) { part.geometry.dispose(); part.material.dispose(); }
     }
     const material = new MeshStandardMaterial({ color: this.colours.floor, roughness: 1, side: DoubleSide, flatShading: Boolean(ground) });
+    Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 }); // the lines lie on it
     if (ground) {
       this.floor = [new Mesh(landscape(ground), material)];
     } else {
       const grid = new GridHelper(60, 60, this.colours.line, this.colours.line).rotateX(Math.PI / 2);
-      grid.position.z = 0.002;
+      grid.position.z = 0.003;
       this.floor = [new Mesh(new PlaneGeometry(60, 60), material), grid];
     }
     this.floor[0].receiveShadow = true;
@@ -118,9 +120,19 @@ export class View {
     this.renderer.render(this.scene, this.camera);
   }
 
+  // seconds since the last frame of the page: without a GPU shadows and sharp edges cost too much.
+  pace(seconds) {
+    this.mean = 0.9 * (this.mean ?? 0) + 0.1 * Math.min(seconds, 0.5);
+    if (this.plain || this.mean < SLOW_S) return;
+    this.plain = true;
+    this.sun.castShadow = false;
+    this.resize();
+    this.dirty = true;
+  }
+
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(this.plain ? 0.75 : Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / Math.max(height, 1);
     this.camera.updateProjectionMatrix();

@@ -1,0 +1,22 @@
+from __future__ import annotations
+
+import pytest
+from edit_samples import make_curve, make_simulator
+
+from getup_jax.checkpoint import LoadedPolicy
+from getup_jax.editor.simulate import Motion, Simulator
+
+
+@pytest.fixture(scope="session")
+def tiny(tmp_path_factory) -> tuple[Simulator, LoadedPolicy]:
+    return make_simulator(tmp_path_factory.mktemp("editor"))
+
+
+@pytest.fixture(scope="session")
+def simulator(tiny) -> Simulator:
+    return tiny[0]
+
+
+@pytest.fixture(scope="session")
+def motion(simulator) -> Motion:
+    return simulator.finish(make_curve())

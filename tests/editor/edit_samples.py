@@ -1,0 +1,49 @@
+"""An editor of the tiny task with an untrained policy, and curves for it."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+from tiny_task import getups, neutral_prior
+
+from eval_samples import SMALL, save_policy
+from getup_jax.checkpoint import LoadedPolicy, load_policy
+from getup_jax.config import Config, TerrainConfig
+from getup_jax.editor.simulate import Simulator, editor_config
+from getup_jax.motion.curve_file import CurveFile
+from getup_jax.physics.character import load_character
+from getup_jax.tasks.build import BuiltTask, assemble
+
+SECONDS = 0.9
+
+
+def make_curve(end_height: float = 1.4, start: str = "clip") -> CurveFile:
+    """A rise from the back in a straight line."""
+    share = np.linspace(0.0, 1.0, 9)[:, None]
+    first, last = np.array([0.12, 90.0, 1.0]), np.array([end_height, 90.0, 90.0])
+    return CurveFile("line", "other", start, (SECONDS,), first + share * (last - first))
+
+
+def make_task(config: Config) -> BuiltTask:
+    """The tiny task's styles with a motion."""
+    character = load_character(config.physics)
+    styles = [getup for getup in getups(character) if getup.clip is not None]
+    return assemble(config, character, styles, neutral_prior(character), lambda text: None)
+
+
+def make_simulator(folder: Path) -> tuple[Simulator, LoadedPolicy]:
+    """A simulator of an untrained policy that is written below the folder, and the policy."""
+    config = editor_config(SMALL)
+    task = make_task(config)
+    loaded = load_policy(save_policy(folder / "run", task, SMALL))
+    return Simulator.of(config, task, loaded), loaded
+
+
+def make_ground_simulator(loaded: LoadedPolicy, terrain: TerrainConfig) -> Simulator:
+    """The same policy on irregular ground with two places a region."""
+    config = editor_config(SMALL)
+    rows = dataclasses.replace(config.task, pool_size=8)
+    config = dataclasses.replace(config, task=rows, terrain=terrain)
+    return Simulator.of(config, make_task(config), loaded)

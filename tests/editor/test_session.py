@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+import dataclasses
+import json
+import struct
+import threading
+import time
+
+import numpy as np
+import pytest
+from edit_samples import make_curve
+
+from getup_jax.editor import messages
+from getup_jax.editor.messages import Request
+from getup_jax.editor.session import Session
+
+NUMBERS = 20 * 7 + 4  # of a frame: links, features, running
+
+
+class Slow:
+    """A simulator whose chunks wait to be let through."""
+
+    def __init__(self, real) -> None:
+        self.real, self.gate, self.chunks = real, threading.Event(), 0
+
+    def __getattr__(self, name):
+        return getattr(self.real, name)
+
+    def run(self, curve, place):
+        for part in self.real.run(curve, place):
+            self.gate.wait(30)
+            self.chunks += 1
+            yield part
+
+
+class Box:
+    """What a page was sent."""
+
+    def __init__(self) -> None:
+        self.got: list[dict] = []
+        self.done = threading.Event()
+
+    def __call__(self, message: str | bytes) -> None:
+        self.got.append(header(message))
+        if isinstance(message, str) and json.loads(message)["type"] in ("result", "error"):
+            self.done.set()
+
+
+def header(message: str | bytes) -> dict:
+    if isinstance(message, str):
+        return json.loads(message)
+    (length,) = struct.unpack_from("<I", message)
+    found = json.loads(message[4 : 4 + length])
+    payload = np.frombuffer(message[4 + length :], "<f4")
+    assert payload.size == found["count"] * NUMBERS
+    return found
+
+
+@pytest.fixture
+def session(simulator):
+    session = Session(Slow(simulator))
+    yield session
+    session.simulator.gate.set()
+    session.stop()
+
+
+def ask(number: int, height: float = 1.4, slot: int = 0) -> Request:
+    return Request("simulate", number, slot, make_curve(height))
+
+
+def test_frames_come_first_and_then_the_result(session):
+    box = Box()
+    session.simulator.gate.set()
+    session.submit(0, ask(7), box)
+    assert box.done.wait(60)
+    *frames, result = box.got
+    assert [f["type"] for f in frames] == ["frames"] * len(frames)
+    assert sum(f["count"] for f in frames) == frames[0]["total"]
+    assert (result["type"], result["number"]) == ("result", 7)
+    assert result["success"] is False
+    assert result["verdict"].startswith("fails at")
+    assert session.motion(ask(8)).scores["energy_j"] == result["scores"]["energy_j"]
+
+
+def test_a_new_edit_cancels_the_old_one(session):
+    old, new = Box(), Box()
+    session.submit(0, ask(1), old)
+    deadline = time.monotonic() + 30
+    while session._current is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    session.submit(0, ask(2, 0.9), new)
+    session.simulator.gate.set()
+    assert new.done.wait(60)
+    assert old.got == []
+    whole = len(list(session.simulator.real.run(make_curve())))
+    assert session.simulator.chunks == whole + 1  # one chunk of the old one was under way
+
+
+def test_other_variants_and_pages_wait_for_their_turn(session):
+    boxes = [Box(), Box(), Box()]
+    for box, (page, slot) in zip(boxes, [(0, 0), (0, 1), (1, 0)], strict=True):
+        session.submit(page, ask(3, slot=slot), box)
+    session.simulator.gate.set()
+    assert all(box.done.wait(60) for box in boxes)
+
+
+def test_a_page_that_leaves_is_forgotten_and_an_error_stops_no_other(session):
+    left, bad, good = Box(), Box(), Box()
+    session.submit(0, ask(1), left)
+    session.forget(0)
+    session.submit(1, Request("simulate", 2, 0, make_curve(start="nothing")), bad)
+    session.submit(2, ask(3), good)
+    session.simulator.gate.set()
+    assert bad.done.wait(60)
+    assert good.done.wait(60)
+    assert left.got == []
+    assert "start: expected one of clip" in bad.got[-1]["text"]
+    assert good.got[-1]["type"] == "result"
+
+
+def test_a_verdict_says_how_the_episode_ended(motion):
+    frames = dataclasses.replace(motion.frames, running=np.ones(len(motion.time), bool))
+    stays = dataclasses.replace(motion, frames=frames)
+    assert messages.verdict(stays) == "does not stand at the end"
+    stands = dataclasses.replace(motion, scores={"success": 1.0, "stand_time_s": 2.34})
+    assert messages.verdict(stands) == "stands after 2.3 s"
+    running = np.arange(len(motion.time)) < 12
+    frames = dataclasses.replace(motion.frames, running=running)
+    low = dataclasses.replace(motion, frames=frames, task_reward=np.full(len(running), 0.05))
+    assert messages.verdict(low) == "fails at 0.4 s: too far from the curves"
+    head = dataclasses.replace(low, task_reward=np.full(len(running), 0.5))
+    assert messages.verdict(head) == "fails at 0.4 s: head on the floor"
