@@ -138,7 +138,9 @@ def test_eval_passes_its_arguments_on(monkeypatch):
     assert cli.eval_main([*options, "--video", "a.mp4", "--engine", "mjx"]) == 0
     default = {"ckpt": "flat", "episodes": None, "seed": 0, "start": "lying"}
     default |= {"start_noise": 0.0, "duration_scale": (1.0, 1.0)}
-    default |= dict.fromkeys(["json", "video", "plot", "engine", "stand_time", "blend", "push"])
+    default |= dict.fromkeys(
+        ["json", "video", "plot", "engine", "stand_time", "blend", "push", "curves"]
+    )
     default |= {"terrain_seed": None}
     assert vars(seen[0]) == default
     assert vars(seen[1]) == default | {

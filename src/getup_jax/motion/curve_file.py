@@ -113,10 +113,11 @@ def parse_text(text: str | bytes, where: str) -> CurveFile:
     """The style in the text of a file that is called `where`."""
     if len(text) > _MAX_BYTES:
         raise MotionError(f"{where}: expected at most {_MAX_BYTES} bytes, got {len(text)}")
-    nested = text.count(b"[" if isinstance(text, bytes) else "[")
+    if isinstance(text, bytes):
+        text = text.decode("utf-8", "replace")
     try:
         # a deep nest takes the parser long
-        content = yaml.safe_load(text) if nested <= _MOST_LISTS else None
+        content = yaml.safe_load(text) if text.count("[") <= _MOST_LISTS else None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         line = getattr(getattr(error, "problem_mark", None), "line", None)
         place = "" if line is None else f", line {line + 1}"
