@@ -50,7 +50,7 @@ def opened(address: str, **context: Any) -> Iterator[Any]:
         page.wait_for_selector("body[data-shown]", timeout=120_000)
         yield page
         browser.close()
-    assert not problems
+    assert not problems, problems
 
 
 def drag(page: Any, panel: str, point: int, pixels: int) -> None:

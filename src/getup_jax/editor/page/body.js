@@ -28,6 +28,7 @@ export class Body {
   // A ghost is see-through and in the tint of its variant.
   dress(ghost, slot) {
     for (const material of this.materials) {
+      material.needsUpdate = material.transparent !== ghost; // another shader
       material.transparent = ghost;
       material.opacity = ghost ? 0.4 : 1;
       material.polygonOffset = ghost; // behind the solid body where both are at one place

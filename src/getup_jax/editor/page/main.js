@@ -22,7 +22,7 @@ const model = {
   store, motions,
   time: () => player.time,
   span: () => (scene && store.variants.length ? store.curve.durations[0] + scene.stand_time_s : 1),
-  get controlDt() { return scene.control_dt; },
+  get controlDt() { return scene?.control_dt ?? 0; },
   band: () => scene?.bands[$("band").value],
 };
 

@@ -1,7 +1,7 @@
 // The 3-D view: ground, the variants' bodies, light, and a camera that orbits and follows.
 
 import {
-  BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Fog, GridHelper, HemisphereLight, Mesh,
+  BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Fog, HemisphereLight, LineBasicMaterial, LineSegments, Mesh,
   MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, PlaneGeometry, Scene, Vector3, WebGLRenderer,
 } from "./vendor/three.min.js";
 import { Body } from "./body.js";
@@ -61,9 +61,7 @@ export class View {
     if (ground) {
       this.floor = [new Mesh(landscape(ground), material)];
     } else {
-      const grid = new GridHelper(60, 60, this.colours.line, this.colours.line).rotateX(Math.PI / 2);
-      grid.position.z = 0.003;
-      this.floor = [new Mesh(new PlaneGeometry(60, 60), material), grid];
+      this.floor = [new Mesh(new PlaneGeometry(80, 80), material), lines(this.colours.line)];
     }
     this.floor[0].receiveShadow = true;
     this.scene.add(...this.floor);
@@ -163,6 +161,18 @@ export class View {
       }
     });
   }
+}
+
+// A line every metre of the flat ground, in pieces: some renderers drop lines that reach behind the camera.
+function lines(colour) {
+  const half = 20;
+  const ends = [];
+  for (let i = -half; i <= half; i++) {
+    for (let j = -half; j < half; j++) ends.push(i, j, 0.004, i, j + 1, 0.004, j, i, 0.004, j + 1, i, 0.004);
+  }
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(new Float32Array(ends), 3));
+  return new LineSegments(geometry, new LineBasicMaterial({ color: colour }));
 }
 
 // Height field triangles as MuJoCo cuts the cells: from the lower to the upper corner in x and y.
