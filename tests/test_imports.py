@@ -22,6 +22,7 @@ LAYERS = [
     ["algo"],
     ["loop", "train"],
     ["conditions", "naturalness", "episodes", "scores", "score_table", "video", "eval_plot"],
+    ["evaluate_composite"],
     ["evaluate", "model_card", "export"],
     ["eval_options"],
     ["cli", "editor"],

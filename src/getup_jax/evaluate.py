@@ -20,6 +20,7 @@ from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.conditions import Conditions, blended, drawn, make_plan
 from getup_jax.config import Config, ConfigError, TaskConfig, TerrainConfig
 from getup_jax.episodes import Episodes, run_episodes
+from getup_jax.evaluate_composite import evaluate_composite
 from getup_jax.motion.clips import GetUp
 from getup_jax.motion.curve_file import read_curve_file
 from getup_jax.nets import prior as pose_prior
@@ -45,6 +46,8 @@ def evaluate_command(args: argparse.Namespace) -> int:
     if args.plot is not None:
         eval_plot.require()
     loaded = checkpoint.load_policy(args.ckpt)
+    if loaded.config.composite is not None:
+        return evaluate_composite(args, loaded)
     conditions = Conditions.of(args)
     config = evaluation_config(loaded.config, args)
     conditions.check(config)

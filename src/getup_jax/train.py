@@ -9,16 +9,16 @@ from pathlib import Path
 import jax
 
 from getup_jax import checkpoint
-from getup_jax.algo.learner import make_learner
+from getup_jax.algo.learner import Learner, make_learner
 from getup_jax.algo.objectives import make_objectives
-from getup_jax.config import CompositeConfig, Config
+from getup_jax.config import Config
 from getup_jax.loop import Job, Loop, TrainingError, num_iterations, steps_per_iteration
 from getup_jax.metrics import MetricsWriter, tensorboard_module
 from getup_jax.progress import Display, count, duration
 from getup_jax.runfolder import prepare, resume_command
 from getup_jax.stop import StopRequest
 from getup_jax.tasks.build import build_task
-from getup_jax.tasks.build_composite import build_composite
+from getup_jax.tasks.build_composite import BuiltComposite, build_composite
 
 __all__ = ["Job", "TrainingError", "build_job", "run"]
 
@@ -28,7 +28,8 @@ Log = Callable[[str], None]
 def build_job(config: Config, log: Log) -> Job:
     """The task and the learner that the settings ask for."""
     if config.composite is not None:
-        return _composite_job(config, config.composite, log)
+        composite, learner = build_composite_job(config, log)
+        return Job(learner=learner, world=composite.world, prior=None)
     task = build_task(config, log)
     learner = make_learner(
         task.environment, config.network, config.ppo, total_steps=config.train.total_steps
@@ -36,7 +37,8 @@ def build_job(config: Config, log: Log) -> Job:
     return Job(learner=learner, world=task.world, prior=task.prior)
 
 
-def _composite_job(config: Config, composite: CompositeConfig, log: Log) -> Job:
+def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Learner]:
+    """The task and the learner of composite motion."""
     task = build_composite(config, log)
     env = task.environment
     learner = make_learner(
@@ -44,9 +46,9 @@ def _composite_job(config: Config, composite: CompositeConfig, log: Log) -> Job:
         config.network,
         config.ppo,
         total_steps=config.train.total_steps,
-        objectives=make_objectives(env, composite),
+        objectives=make_objectives(env, env.config),
     )
-    return Job(learner=learner, world=task.world, prior=None)
+    return task, learner
 
 
 def run(
