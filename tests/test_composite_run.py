@@ -1,4 +1,4 @@
-"""A composite policy from `getup-train` to `getup-eval`, through the same commands as getting up."""
+"""A composite policy from `getup-train` to `getup-eval`, by the commands of getting up."""
 
 from __future__ import annotations
 
