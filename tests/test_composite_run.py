@@ -84,9 +84,9 @@ def test_a_character_that_plays_the_clips_has_no_error():
     qpos[:, 7:][:, of_upper] = wave[(np.arange(frames) + 3) % len(wave), 7:][:, of_upper]
     qpos[:, 0] += 2.0
     position, quaternion = link_poses(qpos, character)
-    episodes = CompositeEpisodes(
-        position[None], quaternion[None], qpos[None], np.zeros((1, frames), bool)
-    )
+    no_goals = (np.zeros((1, frames, 0)), np.zeros((1, 0)))
+    fell = np.zeros((1, frames), bool)
+    episodes = CompositeEpisodes(position[None], quaternion[None], qpos[None], fell, *no_goals)
     scores = score_composite(task, episodes)
     for error in scores["imitation_error_m"].values():
         assert_allclose(error["mean"], 0.0, atol=1e-5)
@@ -94,7 +94,8 @@ def test_a_character_that_plays_the_clips_has_no_error():
         np.repeat(position[None, :1], frames, axis=1),
         np.repeat(quaternion[None, :1], frames, axis=1),
         qpos[None],
-        np.ones((1, frames), bool),
+        ~fell,
+        *no_goals,
     )
     worse = score_composite(task, still)
     assert worse["imitation_error_m"]["lower"]["mean"] > 0.05

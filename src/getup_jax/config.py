@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import field
+from typing import Any
 
 
 class ConfigError(ValueError):
@@ -284,6 +285,8 @@ class CompositeConfig:
     groups: dict[str, GroupConfig] = field(default_factory=dict)
     shared_links: tuple[str, ...] = ()  # links that several groups may have
     free_links: tuple[str, ...] = ()  # links that need not be in any group
+    # goal tasks by name with their settings, such as {target_location: {speed: [1.2, 1.5]}}
+    goals: dict[str, dict[str, Any]] = field(default_factory=dict)
     weights: dict[str, float] = field(default_factory=dict)  # of objectives; empty: all the same
     multi_objective: bool = True  # False: one critic for the weighted sum of all rewards
     discriminator: DiscriminatorConfig = field(default_factory=DiscriminatorConfig)
@@ -292,11 +295,16 @@ class CompositeConfig:
     end_reward: float = -1.0  # of every objective in the step that ends an episode early
     fall_height_m: float = 0.15  # a joint centre below it, but for the feet's, is a fall
     action_scale: float = 1.0  # of a hinge's whole range, moved by an action of 1
+    # pose of action 0; clips: of each hinge the mean over its group's clips | neutral
+    action_centre: str = "clips"
 
     def __post_init__(self) -> None:
         _require(bool(self.groups), "composite.groups", "at least one group", self.groups)
         _require(self.episode_s > 0, "composite.episode_s", "more than 0", self.episode_s)
         _require(self.action_scale > 0, "composite.action_scale", "more than 0", self.action_scale)
+        centres, centre = ("clips", "neutral"), self.action_centre
+        ok = centre in centres
+        _require(ok, "composite.action_centre", f"one of {centres}", centre)
         start = self.start_group
         names = tuple(self.groups)
         ok = start is None or start in names

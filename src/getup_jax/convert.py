@@ -73,6 +73,8 @@ def _convert(value: Any, hint: Any, key: str, default: Any) -> Any:
             return None
         (inner,) = (arg for arg in args if arg is not types.NoneType)
         return _convert(value, inner, key, default)
+    if hint is Any:  # checked by whoever reads it
+        return value.value if isinstance(value, Text) else value
     if dataclasses.is_dataclass(hint):
         same = default if isinstance(default, typing.cast(type, hint)) else None
         return section(value, typing.cast(type, hint), key, same)

@@ -39,6 +39,8 @@ class CompositeEpisodes:
     quaternion: np.ndarray  # [N, T, L, 4]
     qpos: np.ndarray  # [N, T, 7 + J]
     fell: np.ndarray  # [N, T] bool, a fall or a failed simulation at this step
+    goal_reward: np.ndarray  # [N, T, G] of the goal tasks
+    goal_success: np.ndarray  # [N, G] share of the attempts that succeeded; NaN without attempts
 
 
 def evaluate_composite(args: argparse.Namespace, loaded: LoadedPolicy) -> int:
@@ -68,6 +70,8 @@ def run_composite(
     env = task.environment
     steps = round(env.config.episode_s / env.engine.control_dt)
 
+    first = len(env.groups)
+
     def play(world: Any, policy: Any, key: jax.Array) -> tuple[jax.Array, ...]:
         state = env.init(world, key, number)
 
@@ -76,10 +80,12 @@ def run_composite(
             state, output = env.advance(world, state, action)
             seen = state.physics.kinematics
             kept = (seen.link_position, seen.link_quaternion, seen.qpos, output.terminated)
-            return state, kept
+            return state, (*kept, output.reward[:, first:])
 
-        _, found = jax.lax.scan(step, state, None, length=steps)
-        return jax.tree.map(lambda x: jnp.swapaxes(x, 0, 1), found)
+        state, found = jax.lax.scan(step, state, None, length=steps)
+        shares = list(env.success(state).values())
+        success = jnp.stack(shares, axis=-1) if shares else jnp.zeros((number, 0))
+        return (*jax.tree.map(lambda x: jnp.swapaxes(x, 0, 1), found), success)
 
     found = jax.jit(play)(jax.device_put(task.world), policy, jax.random.PRNGKey(seed))
     return CompositeEpisodes(*(np.asarray(x) for x in found))
@@ -95,7 +101,16 @@ def score_composite(task: BuiltComposite, episodes: CompositeEpisodes) -> dict[s
         each = np.stack([_error(task, group, motion, clip) for clip in clips]).min(axis=0)
         errors[group.name] = {"mean": float(each.mean()), "std": float(each.std())}
     means = [error["mean"] for error in errors.values()]
+    goals = {}
+    for index, name in enumerate(task.environment.goals.names):
+        share = episodes.goal_success[:, index]
+        known = share[np.isfinite(share)]
+        goals[name] = {
+            "reward": float(episodes.goal_reward[:, :, index].mean()),
+            "success": float(known.mean()) if known.size else None,
+        }
     return {
+        "goals": goals,
         "imitation_error_m": errors,
         "ratio": max(means) / max(min(means), 1e-9),
         "fall_share": float(episodes.fell.any(axis=1).mean()),
@@ -147,6 +162,9 @@ def _table(scores: dict[str, Any]) -> str:
     lines = ["group            imitation error (m)"]
     for name, error in scores["imitation_error_m"].items():
         lines.append(f"{name:16} {error['mean']:.3f} +- {error['std']:.3f}")
+    for name, goal in scores["goals"].items():
+        share = "-" if goal["success"] is None else f"{100 * goal['success']:.0f} %"
+        lines.append(f"{name:16} reward {goal['reward']:.3f}, reached {share}")
     lines.append(f"largest / smallest {scores['ratio']:.2f}")
     lines.append(f"episodes with a fall {100 * scores['fall_share']:.0f} %")
     return "\n".join(lines)

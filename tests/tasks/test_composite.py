@@ -12,7 +12,7 @@ from tiny_composite import CONFIG, clips, tiny_composite
 
 from getup_jax.config import ConfigError
 from getup_jax.physics.character import load_character
-from getup_jax.tasks.build_composite import assemble_composite, resampled
+from getup_jax.tasks.build_composite import action_centre, assemble_composite, resampled
 from getup_jax.tasks.composite import FRAMES, LINK_STATE, observe
 
 SIZE = 16
@@ -123,10 +123,19 @@ def test_episodes_are_cut_after_their_time(built, steps):
     assert not (output.truncated & output.terminated).any()
 
 
-def test_zero_action_is_the_neutral_pose_and_one_a_whole_range(built, character):
-    world = built.world
-    assert_allclose(world.target_centre, character.neutral_qpos[7:], atol=1e-6)
-    assert_allclose(world.target_scale, character.joint_upper - character.joint_lower, rtol=1e-6)
+def test_action_zero_is_the_mean_pose_of_each_groups_clips(built, character):
+    world, found = built.world, clips(character)
+    centre = np.asarray(world.target_centre)
+    arm, knee = character.joint("arm_r_abd"), character.joint("shin_l_flex")
+    assert_allclose(centre[arm], 2.0, atol=1e-6)
+    assert_allclose(centre[knee], found["lower"][0].qpos[:, 7 + knee].mean(), atol=1e-6)
+    ranges = character.joint_upper - character.joint_lower
+    assert_allclose(world.target_scale, ranges, rtol=1e-6)
+    neutral = dataclasses.replace(
+        built.environment,
+        config=dataclasses.replace(built.environment.config, action_centre="neutral"),
+    )
+    assert_allclose(action_centre(neutral, found), character.neutral_qpos[7:])
 
 
 def test_clips_at_another_rate(character):
@@ -145,3 +154,32 @@ def test_starts_must_stand(character):
     lying["lower"] = [dataclasses.replace(clip, qpos=qpos)]
     with pytest.raises(ConfigError, match=r"groups\.lower\.clips: every frame counts as a fall"):
         assemble_composite(CONFIG, character, lying, lambda text: None)
+
+
+def test_goals_join_the_observation_the_rewards_and_the_counts(character):
+    composite = dataclasses.replace(
+        CONFIG.composite,
+        goals={"target_location": {"time": [0.15, 0.15], "radius_m": 0.3, "turn": 0.5}},
+    )
+    built = tiny_composite(character, dataclasses.replace(CONFIG, composite=composite))
+    env, world = built.environment, built.world
+    assert env.objectives == ("upper", "lower", "target_location")
+    assert env.num_objectives == 3
+    state = jax.jit(env.init, static_argnums=2)(world, jax.random.key(0), SIZE)
+    assert state.observation.shape == (SIZE, env.observation_size)
+    step = jax.jit(env.step)
+    # 0.15 s at 1.2 m/s or more is inside the radius, so every attempt of a standing body succeeds
+    for _ in range(6):
+        state, output = step(world, state, jnp.zeros((SIZE, env.action_size)))
+        going = ~np.asarray(output.terminated)
+        assert_allclose(output.reward[going, :2], 0.0)
+        assert (np.asarray(output.reward)[going, 2] > 0.0).all()
+    assert float(state.attempts.max()) >= 1.0
+    share = np.asarray(env.success(state)["success_target_location"])
+    assert_allclose(share[np.isfinite(share)], 1.0)
+
+
+def test_a_goals_mistake_names_its_key(character):
+    composite = dataclasses.replace(CONFIG.composite, goals={"target_locaton": {}})
+    with pytest.raises(ConfigError, match=r"composite\.goals: .*target_location"):
+        tiny_composite(character, dataclasses.replace(CONFIG, composite=composite))

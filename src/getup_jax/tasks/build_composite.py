@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.config import CompositeConfig, Config, ConfigError
+from getup_jax.config import Config, ConfigError, TaskConfig
 from getup_jax.motion.clips import Clip
 from getup_jax.motion.named_clips import named_clips
 from getup_jax.physics.character import CharacterSpec, load_character
@@ -21,6 +21,7 @@ from getup_jax.tasks.composite import (
     Starts,
     link_state,
 )
+from getup_jax.tasks.goals.combine import make_goals
 from getup_jax.tasks.groups import objective_weights, resolve_groups
 from getup_jax.tasks.reference_windows import make_references, unrolled
 from getup_jax.types import Engine, take
@@ -62,7 +63,10 @@ def assemble_composite(
     assert composite is not None
     groups = resolve_groups(composite, character)
     engine = make_engine(character, config.physics)
-    task = CompositeTask(engine, character, composite, groups)
+    goals = make_goals(composite.goals, character, engine.control_dt)
+    if goals.balls:
+        raise ConfigError(f"composite.goals: {', '.join(goals.names)}: balls are not wired in yet")
+    task = CompositeTask(engine, character, composite, groups, goals)
     objective_weights(composite, task.objectives)  # a mistake in them is told before anything long
     references = {
         group.name: make_references(clips[group.name], group, character, engine.control_dt)
@@ -73,22 +77,39 @@ def assemble_composite(
     _check_starts(task, starts, f"composite.groups.{start}.clips")
     log(f"engine: {engine.name}; {len(starts.history)} start states along {start}'s clips")
     world = CompositeWorld(
-        starts=starts, references=references, **_targets(character, composite, config)
+        starts=starts, references=references, **_targets(task, clips, config.task)
     )
     return BuiltComposite(task, world, clips)
 
 
-def _targets(character: CharacterSpec, composite: CompositeConfig, config: Config) -> dict:
-    """Servo targets: the neutral pose, moved by shares of each hinge's range."""
-    lower, upper = character.joint_lower, character.joint_upper
-    margin = config.task.target_margin_rad
+def _targets(task: CompositeTask, clips: dict[str, list[Clip]], config: TaskConfig) -> dict:
+    """Servo targets: a pose, moved by shares of each hinge's range."""
+    lower, upper = task.character.joint_lower, task.character.joint_upper
+    margin = config.target_margin_rad
     values = {
-        "target_centre": character.neutral_qpos[7:],
-        "target_scale": composite.action_scale * (upper - lower),
+        "target_centre": action_centre(task, clips),
+        "target_scale": task.config.action_scale * (upper - lower),
         "target_lower": lower - margin,
         "target_upper": upper + margin,
     }
     return {name: jnp.asarray(value, jnp.float32) for name, value in values.items()}
+
+
+def action_centre(task: CompositeTask, clips: dict[str, list[Clip]]) -> np.ndarray:
+    """Hinge angles [J] of action 0.
+
+    With `neutral`, an arm that a clip holds up all the time is many standard deviations of the
+    first policy away. So the default is each hinge's mean over the clips of its link's group.
+    """
+    character = task.character
+    centre = character.neutral_qpos[7:].copy()
+    if task.config.action_centre == "neutral":
+        return centre
+    for group in reversed(task.groups):  # of two groups with one link, the first one counts
+        own = np.isin(character.joint_link, group.links)
+        frames = np.concatenate([clip.qpos[:, 7:] for clip in clips[group.name]])
+        centre[own] = frames.mean(axis=0)[own]
+    return centre
 
 
 def _starts(clips: Sequence[Clip], character: CharacterSpec, engine: Engine, most: int) -> Starts:

@@ -17,6 +17,8 @@ from getup_jax import rotation
 from getup_jax.config import CompositeConfig
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.rows import replace_rows
+from getup_jax.tasks.goals.combine import Goals
+from getup_jax.tasks.goals.goal import GoalOutput
 from getup_jax.tasks.groups import Group
 from getup_jax.tasks.reference_windows import References, nearest
 from getup_jax.types import Engine, Kinematics, PhysicsState, StepOutput, take
@@ -54,6 +56,9 @@ class CompositeState:
     observation: jax.Array  # [B, O]
     history: jax.Array  # [B, FRAMES + 1, L, LINK_STATE] world frame, the oldest first
     step: jax.Array  # [B] int32, steps done
+    goals: Any  # states of the goal tasks, or None
+    attempts: jax.Array  # [B, G] attempts at each goal that ended in this episode
+    successes: jax.Array  # [B, G] those that succeeded
     key: Any
 
 
@@ -65,6 +70,7 @@ class CompositeTask:
     character: CharacterSpec
     config: CompositeConfig
     groups: tuple[Group, ...]
+    goals: Goals = dataclasses.field(default_factory=lambda: Goals(()))
 
     @property
     def frames(self) -> tuple[int, int]:
@@ -73,8 +79,8 @@ class CompositeTask:
 
     @property
     def observation_size(self) -> int:
-        """O."""
-        return FRAMES * self.frames[1]
+        """O: the frames, then the goal states."""
+        return FRAMES * self.frames[1] + self.goals.observation_size
 
     @property
     def action_size(self) -> int:
@@ -83,8 +89,8 @@ class CompositeTask:
 
     @property
     def objectives(self) -> tuple[str, ...]:
-        """Names of all objectives."""
-        return tuple(group.name for group in self.groups)
+        """Names of all objectives: imitations, then goals."""
+        return (*(group.name for group in self.groups), *self.goals.names)
 
     @property
     def num_objectives(self) -> int:
@@ -93,18 +99,23 @@ class CompositeTask:
 
     def init(self, world: CompositeWorld, key: jax.Array, num_envs: int) -> CompositeState:
         """B fresh episodes."""
-        key_start, key_state = jax.random.split(key)
-        row = self._draw(world, key_start, num_envs)
-        return self.start(world, row).replace(key=key_state)
+        key_row, key_start, key_state = jax.random.split(key, 3)
+        row = self._draw(world, key_row, num_envs)
+        return self.start(world, row, key_start).replace(key=key_state)
 
-    def start(self, world: CompositeWorld, row: jax.Array) -> CompositeState:
-        """Episodes from rows [B] of the start states."""
+    def start(self, world: CompositeWorld, row: jax.Array, key: jax.Array) -> CompositeState:
+        """Episodes from rows [B] of the start states; the key is for their goals."""
         starts = take(world.starts, row)
+        none = jnp.zeros((len(row), len(self.goals.names)), jnp.float32)
+        goals = self.goals.reset(key, starts.physics.kinematics)
         return CompositeState(
             physics=starts.physics,
-            observation=observe(starts.history[:, 1:]),
+            observation=self._observe(starts.history, goals, starts.physics),
             history=starts.history,
             step=jnp.zeros(row.shape, jnp.int32),
+            goals=goals,
+            attempts=none,
+            successes=none,
             key=None,
         )
 
@@ -112,48 +123,82 @@ class CompositeTask:
         self, world: CompositeWorld, state: CompositeState, action: jax.Array
     ) -> tuple[CompositeState, StepOutput]:
         """One control step; episodes that end start anew."""
-        key_next, key_reset = jax.random.split(state.key)
         after, output = self.advance(world, state, action)
-        drawn = self._draw(world, key_reset, action.shape[0])
+        key_next, key_draw, key_start = jax.random.split(after.key, 3)
+        drawn = self._draw(world, key_draw, action.shape[0])
         done = output.terminated | output.truncated
-        after = replace_rows(
-            after.replace(key=None), done, lambda i: self.start(world, drawn[i]), _RESET_CHUNK
-        ).replace(key=key_next)
+
+        def fresh(index: jax.Array) -> CompositeState:
+            # the first index of a chunk is in no other
+            return self.start(world, drawn[index], jax.random.fold_in(key_start, index[0]))
+
+        after = replace_rows(after.replace(key=None), done, fresh, _RESET_CHUNK)
+        after = after.replace(key=key_next)
         return after, output.replace(observation=after.observation)
 
     def advance(
         self, world: CompositeWorld, state: CompositeState, action: jax.Array
     ) -> tuple[CompositeState, StepOutput]:
         """One control step without resets; `observation` is the final one."""
+        key, key_goals = jax.random.split(state.key)
         target = world.target_centre + world.target_scale * action
         target = jnp.clip(target, world.target_lower, world.target_upper)
         physics = self.engine.step(state.physics, target)
         finite = physics.kinematics.finite
         frame = jnp.where(finite[:, None, None], link_state(physics.kinematics), 0.0)
         history = jnp.concatenate([state.history[:, 1:], frame[:, None]], axis=1)
+        goals, goal_outputs = self.goals.step(key_goals, state.goals, physics.kinematics)
+        observation = self._observe(history, goals, physics)
         state = CompositeState(
             physics=physics,
-            observation=observe(history[:, 1:]),
+            observation=jnp.where(finite[:, None], observation, 0.0),
             history=history,
             step=state.step + 1,
-            key=state.key,
+            goals=goals,
+            key=key,
+            **_count(state, goal_outputs),
         )
-        fallen = finite & self.has_fallen(physics.kinematics)
-        terminated = fallen | ~finite
+        return state, self._output(world, state, goal_outputs)
+
+    def _output(
+        self, world: CompositeWorld, state: CompositeState, goals: tuple[GoalOutput, ...]
+    ) -> StepOutput:
+        """What a step returns; the imitation rewards are 0 until a discriminator gives them."""
+        kinematics = state.physics.kinematics
+        causes = {
+            "ended_fall": kinematics.finite & self.has_fallen(kinematics),
+            "ended_not_finite": ~kinematics.finite,
+        }
+        names = self.goals.names
+        causes |= {f"ended_{n}": goal.terminated for n, goal in zip(names, goals, strict=True)}
+        terminated = jnp.any(jnp.stack(list(causes.values())), axis=0)
+        none = jnp.zeros(terminated.shape, jnp.float32)
+        rewards = [none for _ in self.groups] + [goal.reward for goal in goals]
+        reward = jnp.stack(rewards, axis=-1)
         last = round(self.config.episode_s / self.engine.control_dt)
-        windows = self.windows(history)
-        ended = jnp.where(terminated, self.config.end_reward, 0.0)
-        output = StepOutput(
+        windows = self.windows(state.history)
+        causes_seen = {name: cause.astype(jnp.float32) for name, cause in causes.items()}
+        return StepOutput(
             observation=state.observation,
             final_observation=state.observation,
-            reward=jnp.tile(ended[:, None], (1, len(self.objectives))),
+            reward=jnp.where(terminated[:, None], self.config.end_reward, reward),
             terminated=terminated,
             truncated=~terminated & (state.step >= last),
-            metrics=self._metrics(world, windows, fallen, finite),
-            episode={"steps": state.step.astype(jnp.float32)},
+            metrics=self._gaps(world, windows) | causes_seen,
+            episode={"steps": state.step.astype(jnp.float32)} | self.success(state),
             extras=windows,
         )
-        return state, output
+
+    def success(self, state: CompositeState) -> dict[str, jax.Array]:
+        """Share [B] of each goal's attempts so far that succeeded; NaN where none ended."""
+        share = state.successes / jnp.where(state.attempts > 0, state.attempts, jnp.nan)
+        return {f"success_{name}": share[:, i] for i, name in enumerate(self.goals.names)}
+
+    def _observe(self, history: jax.Array, goals: Any, physics: PhysicsState) -> jax.Array:
+        frames = observe(history[:, 1:])
+        if not self.goals.names:
+            return frames
+        return jnp.concatenate([frames, self.goals.observe(goals, physics.kinematics)], axis=-1)
 
     def windows(self, history: jax.Array) -> dict[str, jax.Array]:
         """What each group's discriminator sees, [B, F, D] by name."""
@@ -172,24 +217,29 @@ class CompositeTask:
         height = kinematics.link_position[:, links, 2]
         return jnp.min(height, axis=-1) < self.config.fall_height_m
 
-    def _metrics(
-        self,
-        world: CompositeWorld,
-        windows: dict[str, jax.Array],
-        fallen: jax.Array,
-        finite: jax.Array,
-    ) -> dict[str, jax.Array]:
-        gaps = {
+    def _gaps(self, world: CompositeWorld, windows: dict[str, jax.Array]) -> dict[str, jax.Array]:
+        """Distance of every group to the nearest pose of its clips (m)."""
+        return {
             f"pose_gap_{group.name}_m": nearest(
                 world.references[group.name], group, windows[group.name]
             )
             for group in self.groups
         }
-        causes = {"ended_fall": fallen, "ended_not_finite": ~finite}
-        return gaps | {name: cause.astype(jnp.float32) for name, cause in causes.items()}
 
     def _draw(self, world: CompositeWorld, key: jax.Array, num_envs: int) -> jax.Array:
         return jax.random.randint(key, (num_envs,), 0, len(world.starts.history))
+
+
+def _count(state: CompositeState, outputs: tuple[GoalOutput, ...]) -> dict[str, jax.Array]:
+    """The episode's attempts and successes [B, G] after a step; success is NaN where none ended."""
+    if not outputs:
+        return {"attempts": state.attempts, "successes": state.successes}
+    success = jnp.stack([goal.success for goal in outputs], axis=-1)
+    ended = ~jnp.isnan(success)
+    return {
+        "attempts": state.attempts + ended,
+        "successes": state.successes + jnp.where(ended, success, 0.0),
+    }
 
 
 def link_state(kinematics: Kinematics) -> jax.Array:
