@@ -66,6 +66,16 @@ def test_evaluation_reports_the_error_of_every_group(run_folder, tmp_path, capsy
     assert scores["episodes"] == 3
 
 
+@pytest.mark.slow
+def test_a_policy_is_trained_on_top_of_a_meta_policy(run_folder, tmp_path, capsys):
+    folder, change = tmp_path / "on_top", f"composite.meta={run_folder}"
+    arguments = ["composite_wave_squat", *SMALL, change, "--run", str(folder), "--quiet"]
+    assert train_main(arguments) == 0
+    assert np.isfinite(read_metrics(folder)[-1]["loss/policy"])
+    assert eval_main(["--ckpt", str(folder), "--episodes", "2"]) == 0
+    assert "lower" in capsys.readouterr().out
+
+
 def test_options_of_getting_up_are_refused(run_folder, capsys):
     assert eval_main(["--ckpt", str(run_folder), "--push", "20"]) == 2
     assert "--push: only for policies of the get-up task" in capsys.readouterr().err

@@ -290,6 +290,7 @@ class CompositeConfig:
     weights: dict[str, float] = field(default_factory=dict)  # of objectives; empty: all the same
     multi_objective: bool = True  # False: one critic for the weighted sum of all rewards
     discriminator: DiscriminatorConfig = field(default_factory=DiscriminatorConfig)
+    meta: str | None = None  # a composite policy whose actions this one weights and adds to [C 5]
     start_group: str | None = None  # episodes start along its clips; None: the last group's
     episode_s: float = 10.0
     end_reward: float = -1.0  # of every objective in the step that ends an episode early

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from getup_jax import video
-from getup_jax.algo.learner import Learner
+from getup_jax.algo.meta import MetaTask
 from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.config import ConfigError
 from getup_jax.motion.clips import Clip
@@ -25,7 +25,7 @@ from getup_jax.storage import from_nested
 from getup_jax.tasks.build_composite import BuiltComposite, resampled
 from getup_jax.tasks.groups import Group
 from getup_jax.tasks.reference_windows import link_poses
-from getup_jax.train import build_composite_job
+from getup_jax.train import Job, build_composite_job
 
 EPISODES = 32  # by default
 _FILMED = 3
@@ -49,8 +49,8 @@ def evaluate_composite(args: argparse.Namespace, loaded: LoadedPolicy) -> int:
     _refuse_getup_options(args)
     number = args.episodes or EPISODES
     with Display(number, unit="episodes") as display:
-        task, learner, policy = _restore(args, loaded, display)
-        episodes = run_composite(task, learner, policy, number, args.seed)
+        task, job, policy = _restore(args, loaded, display)
+        episodes = run_composite(job, policy, number, args.seed)
         scores = score_composite(task, episodes)
     print(_table(scores))
     print(f"{number} episodes in {time.monotonic() - begin:.0f} s")
@@ -63,14 +63,15 @@ def evaluate_composite(args: argparse.Namespace, loaded: LoadedPolicy) -> int:
     return 0
 
 
-def run_composite(
-    task: BuiltComposite, learner: Learner, policy: Any, number: int, seed: int
-) -> CompositeEpisodes:
-    """Episodes from random starts with the mean action."""
-    env = task.environment
-    steps = round(env.config.episode_s / env.engine.control_dt)
-
-    first = len(env.groups)
+def run_composite(job: Job, policy: Any, number: int, seed: int) -> CompositeEpisodes:
+    """Episodes from random starts with the mean action, and the mean one of a meta policy."""
+    learner = job.learner
+    env = learner.env
+    if isinstance(env, MetaTask):
+        env = dataclasses.replace(env, sample=False)
+    task = env.task if isinstance(env, MetaTask) else env
+    steps = round(task.config.episode_s / task.engine.control_dt)
+    first = len(task.groups)
 
     def play(world: Any, policy: Any, key: jax.Array) -> tuple[jax.Array, ...]:
         state = env.init(world, key, number)
@@ -78,7 +79,7 @@ def run_composite(
         def step(state: Any, _: None) -> tuple[Any, tuple[jax.Array, ...]]:
             action = learner.act(policy, state.observation)
             state, output = env.advance(world, state, action)
-            seen = state.physics.kinematics
+            seen = env.kinematics(state)
             kept = (seen.link_position, seen.link_quaternion, seen.qpos, output.terminated)
             return state, (*kept, output.reward[:, first:])
 
@@ -87,7 +88,7 @@ def run_composite(
         success = jnp.stack(shares, axis=-1) if shares else jnp.zeros((number, 0))
         return (*jax.tree.map(lambda x: jnp.swapaxes(x, 0, 1), found), success)
 
-    found = jax.jit(play)(jax.device_put(task.world), policy, jax.random.PRNGKey(seed))
+    found = jax.jit(play)(jax.device_put(job.world), policy, jax.random.PRNGKey(seed))
     return CompositeEpisodes(*(np.asarray(x) for x in found))
 
 
@@ -133,15 +134,15 @@ def _seen(group: Group, position: np.ndarray, quaternion: np.ndarray) -> np.ndar
 
 def _restore(
     args: argparse.Namespace, loaded: LoadedPolicy, display: Display
-) -> tuple[BuiltComposite, Learner, Any]:
+) -> tuple[BuiltComposite, Job, Any]:
     config = dataclasses.replace(loaded.config, seed=args.seed)
     if args.engine is not None:
         physics = dataclasses.replace(config.physics, engine=args.engine, solver="auto")
         config = dataclasses.replace(config, physics=physics)
     display.log(f"{loaded.path}: {loaded.metadata.get('steps', 0):,} steps of training")
-    task, learner = build_composite_job(config, display.log)
-    template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0)).policy
-    return task, learner, from_nested(template, loaded.policy, str(loaded.path))
+    task, job = build_composite_job(config, display.log)
+    template = jax.eval_shape(job.learner.init_learner, jax.random.PRNGKey(0)).policy
+    return task, job, from_nested(template, loaded.policy, str(loaded.path))
 
 
 def _refuse_getup_options(args: argparse.Namespace) -> None:

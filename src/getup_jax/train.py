@@ -9,7 +9,8 @@ from pathlib import Path
 import jax
 
 from getup_jax import checkpoint
-from getup_jax.algo.learner import Learner, make_learner
+from getup_jax.algo.learner import make_learner
+from getup_jax.algo.meta_chain import with_meta
 from getup_jax.algo.objectives import make_objectives
 from getup_jax.config import Config
 from getup_jax.loop import Job, Loop, TrainingError, num_iterations, steps_per_iteration
@@ -28,8 +29,7 @@ Log = Callable[[str], None]
 def build_job(config: Config, log: Log) -> Job:
     """The task and the learner that the settings ask for."""
     if config.composite is not None:
-        composite, learner = build_composite_job(config, log)
-        return Job(learner=learner, world=composite.world, prior=None)
+        return build_composite_job(config, log)[1]
     task = build_task(config, log)
     learner = make_learner(
         task.environment, config.network, config.ppo, total_steps=config.train.total_steps
@@ -37,18 +37,21 @@ def build_job(config: Config, log: Log) -> Job:
     return Job(learner=learner, world=task.world, prior=task.prior)
 
 
-def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Learner]:
-    """The task and the learner of composite motion."""
-    task = build_composite(config, log)
-    env = task.environment
+def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Job]:
+    """The task, and the learner and the world of composite motion."""
+    built = build_composite(config, log)
+    env, world = built.environment, built.world
+    if env.config.meta is not None:
+        log(f"meta policy: {env.config.meta}")
+        env, world = with_meta(config, built)
     learner = make_learner(
         env,
         config.network,
         config.ppo,
         total_steps=config.train.total_steps,
-        objectives=make_objectives(env, env.config),
+        objectives=make_objectives(built.environment, built.environment.config),
     )
-    return task, learner
+    return built, Job(learner=learner, world=world, prior=None)
 
 
 def run(

@@ -8,6 +8,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from flax import linen as nn
 
 from getup_jax.algo import normalize, popart
 from getup_jax.algo.state import LearnerState, PolicyState
@@ -23,6 +24,9 @@ ACTOR_OUTPUT_SCALE = 0.01
 # Bounds of the log std that an actor gives, in e-folds around the first one.
 LOG_STD_RANGE = 2.0
 
+# Logit of the first weight of a meta policy's action: 0.88, so that learning starts near it.
+META_LOGIT = 2.0
+
 Network = MLP | HistoryMLP
 
 
@@ -34,6 +38,8 @@ class ActorCritic:
     critic: Network  # to K outputs
     observation_size: int  # O
     initial_std: float | None = None  # None: the std is a setting, not the actor's
+    # A where the observation ends in a meta policy's action, which only the mean gets, else 0
+    meta_size: int = 0
 
     def init(self, key: jax.Array, config: PPOConfig) -> LearnerState:
         """Fresh variables, and the statistics that the settings ask for."""
@@ -55,23 +61,40 @@ class ActorCritic:
 
     def mean(self, actor: Any, normalized: jax.Array) -> jax.Array:
         """Mean actions [..., A] for normalised observations [..., O]."""
-        output: Any = self.actor.apply(actor, normalized)
-        return output if self.initial_std is None else jnp.split(output, 2, axis=-1)[0]
+        return self.distribution(actor, normalized, jnp.zeros(()))[0]
 
     def distribution(
         self, actor: Any, normalized: jax.Array, std: jax.Array
     ) -> tuple[jax.Array, jax.Array]:
-        """Mean [..., A] and std of the actions; `std` [A] is the setting where it is one."""
-        output: Any = self.actor.apply(actor, normalized)
-        if self.initial_std is None:
-            return output, std
-        mean, log_std = jnp.split(output, 2, axis=-1)
+        """Mean [..., A] and std of the actions; `std` [A] is the setting where it is one.
+
+        With a meta policy's action a, the mean is mu + w a (Xu et al. 2023, equation 10).
+        """
+        mean, log_std, weight = self._heads(actor, normalized)
+        if weight is not None:
+            mean = mean + weight * jax.lax.stop_gradient(normalized[..., self.observation_size :])
+        if self.initial_std is None or log_std is None:
+            return mean, std
         log_std = jnp.clip(log_std, -LOG_STD_RANGE, LOG_STD_RANGE) + math.log(self.initial_std)
         return mean, jnp.exp(log_std)
 
+    def meta_weight(self, actor: Any, normalized: jax.Array) -> jax.Array | None:
+        """The weights w [..., A] of a meta policy's action, in (0, 1); None without one."""
+        return self._heads(actor, normalized)[2]
+
+    def _heads(
+        self, actor: Any, normalized: jax.Array
+    ) -> tuple[jax.Array, jax.Array | None, jax.Array | None]:
+        """The actor's own mean, log std and meta weight [..., A]; None where it has none."""
+        output: Any = self.actor.apply(actor, normalized[..., : self.observation_size])
+        has_std, has_meta = self.initial_std is not None, self.meta_size > 0
+        parts = jnp.split(output, 1 + has_std + has_meta, axis=-1)
+        weight = nn.sigmoid(parts[-1] + META_LOGIT) if has_meta else None
+        return parts[0], parts[1] if has_std else None, weight
+
     def output(self, critic: Any, normalized: jax.Array) -> jax.Array:
         """Critic outputs [..., K] in the critic's units for normalised observations [..., O]."""
-        output: Any = self.critic.apply(critic, normalized)
+        output: Any = self.critic.apply(critic, normalized[..., : self.observation_size])
         return output
 
     def value(self, learner: LearnerState, normalized: jax.Array) -> jax.Array:
@@ -82,12 +105,14 @@ class ActorCritic:
 
 def make_actor_critic(env: Environment, config: NetworkConfig) -> ActorCritic:
     """Networks of the sizes that the environment and the settings give."""
-    outputs = env.action_size * (1 if config.initial_std is None else 2)
+    meta_size: int = getattr(env, "meta_size", 0)
+    heads = 1 + (config.initial_std is not None) + (meta_size > 0)
     return ActorCritic(
-        actor=_network(env, config, outputs, ACTOR_OUTPUT_SCALE),
+        actor=_network(env, config, heads * env.action_size, ACTOR_OUTPUT_SCALE),
         critic=_network(env, config, env.num_objectives, 1.0),
-        observation_size=env.observation_size,
+        observation_size=env.observation_size - meta_size,
         initial_std=config.initial_std,
+        meta_size=meta_size,
     )
 
 
@@ -99,15 +124,20 @@ def _network(env: Environment, config: NetworkConfig, outputs: int, scale: float
 
 
 def normalized(policy: PolicyState, observation: jax.Array) -> jax.Array:
-    """Raw observations [..., O] as the networks see them."""
+    """Raw observations [..., O] as the networks see them; a meta policy's action stays raw."""
     if policy.statistics is None:
         return observation
-    return normalize.normalize(policy.statistics, observation)
+    size = policy.statistics.mean.size
+    seen = normalize.normalize(policy.statistics, observation[..., :size])
+    if observation.shape[-1] == size:
+        return seen
+    return jnp.concatenate([seen, observation[..., size:]], axis=-1)
 
 
 def observe(policy: PolicyState, observation: jax.Array) -> PolicyState:
     """The policy with raw observations [..., O] added to its statistics."""
     if policy.statistics is None:
         return policy
-    statistics = normalize.update(policy.statistics, observation)
+    size = policy.statistics.mean.size
+    statistics = normalize.update(policy.statistics, observation[..., :size])
     return dataclasses.replace(policy, statistics=statistics)

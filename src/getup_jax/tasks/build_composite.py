@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.config import Config, ConfigError, TaskConfig
+from getup_jax.config import CompositeConfig, Config, ConfigError, TaskConfig
 from getup_jax.motion.clips import Clip
 from getup_jax.motion.named_clips import named_clips
 from getup_jax.physics.character import CharacterSpec, load_character
@@ -43,10 +43,7 @@ def build_composite(config: Config, log: Callable[[str], None]) -> BuiltComposit
         raise ConfigError("composite: expected groups, got null")
     character = load_character(config.physics)
     resolve_groups(composite, character)  # a mistake in them is told before the clips are read
-    clips = {
-        name: named_clips(part.clips, character, f"composite.groups.{name}.clips")
-        for name, part in composite.groups.items()
-    }
+    clips = load_clips(composite, character)
     for name, found in clips.items():
         log(f"group {name}: {', '.join(f'{c.name} {c.duration:.1f} s' for c in found)}")
     return assemble_composite(config, character, clips, log)
@@ -87,7 +84,7 @@ def _targets(task: CompositeTask, clips: dict[str, list[Clip]], config: TaskConf
     lower, upper = task.character.joint_lower, task.character.joint_upper
     margin = config.target_margin_rad
     values = {
-        "target_centre": action_centre(task, clips),
+        "target_centre": action_centre(task.config, task.character, clips),
         "target_scale": task.config.action_scale * (upper - lower),
         "target_lower": lower - margin,
         "target_upper": upper + margin,
@@ -95,21 +92,31 @@ def _targets(task: CompositeTask, clips: dict[str, list[Clip]], config: TaskConf
     return {name: jnp.asarray(value, jnp.float32) for name, value in values.items()}
 
 
-def action_centre(task: CompositeTask, clips: dict[str, list[Clip]]) -> np.ndarray:
+def action_centre(
+    config: CompositeConfig, character: CharacterSpec, clips: dict[str, list[Clip]]
+) -> np.ndarray:
     """Hinge angles [J] of action 0.
 
     With `neutral`, an arm that a clip holds up all the time is many standard deviations of the
     first policy away. So the default is each hinge's mean over the clips of its link's group.
     """
-    character = task.character
     centre = character.neutral_qpos[7:].copy()
-    if task.config.action_centre == "neutral":
+    if config.action_centre == "neutral":
         return centre
-    for group in reversed(task.groups):  # of two groups with one link, the first one counts
+    groups = resolve_groups(config, character)
+    for group in reversed(groups):  # of two groups with one link, the first one counts
         own = np.isin(character.joint_link, group.links)
         frames = np.concatenate([clip.qpos[:, 7:] for clip in clips[group.name]])
         centre[own] = frames.mean(axis=0)[own]
     return centre
+
+
+def load_clips(config: CompositeConfig, character: CharacterSpec) -> dict[str, list[Clip]]:
+    """The clips of every group."""
+    return {
+        name: named_clips(part.clips, character, f"composite.groups.{name}.clips")
+        for name, part in config.groups.items()
+    }
 
 
 def _starts(clips: Sequence[Clip], character: CharacterSpec, engine: Engine, most: int) -> Starts:

@@ -189,6 +189,10 @@ class CompositeTask:
             extras=windows,
         )
 
+    def kinematics(self, state: CompositeState) -> Kinematics:
+        """What can be seen of the simulations."""
+        return state.physics.kinematics
+
     def success(self, state: CompositeState) -> dict[str, jax.Array]:
         """Share [B] of each goal's attempts so far that succeeded; NaN where none ended."""
         share = state.successes / jnp.where(state.attempts > 0, state.attempts, jnp.nan)
