@@ -17,6 +17,8 @@ from getup_jax.checkpoint import save_learner
 from getup_jax.config import Config, ConfigError, NetworkConfig
 from getup_jax.physics.character import load_character
 
+STATE = {"none": np.zeros(1)}  # of a training that these tests do not go on with
+
 
 @dataclasses.dataclass(frozen=True)
 class MetaProbe(Probe):
@@ -48,7 +50,7 @@ def test_the_mean_is_equation_10():
 
 def test_statistics_leave_the_meta_action_as_it_is():
     model = make_actor_critic(MetaProbe(), NetworkConfig(hidden_sizes=(4,)))
-    policy = model.init(jax.random.key(0), CONFIG.ppo).policy
+    policy = jax.jit(lambda key: model.init(key, CONFIG.ppo).policy)(jax.random.key(0))
     x = jnp.asarray(np.random.default_rng(0).normal(3.0, 2.0, size=(64, 4)), jnp.float32)
     policy = observe(policy, x)
     seen = normalized(policy, x)
@@ -64,7 +66,7 @@ def trained(tmp_path_factory):
     state = jax.jit(learner.init_learner)(jax.random.key(3))
     policy = {"policy": state.policy, "prior": None}
     folder = tmp_path_factory.mktemp("meta") / "checkpoints"
-    return built, learner, state.policy, save_learner(folder, 1, {}, CONFIG, policy)
+    return built, learner, state.policy, save_learner(folder, 1, STATE, CONFIG, policy)
 
 
 def _config(path, **changes) -> Config:
@@ -90,29 +92,29 @@ def test_a_meta_action_reaches_the_pose_that_its_own_policy_would(trained):
         patch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
         task, meta_world = with_meta(config, new)
     still = dataclasses.replace(task, sample=False)
-    action = still.meta_action(meta_world, observation, jax.random.key(0))
+    action = jax.jit(still.meta_action)(meta_world, observation, jax.random.key(0))
     assert_allclose(neutral + 0.5 * world.target_scale * action, own, atol=1e-4)
-    drawn = task.meta_action(meta_world, observation, jax.random.key(0))
+    drawn = jax.jit(task.meta_action)(meta_world, observation, jax.random.key(0))
     assert np.abs(np.asarray(drawn - action)).max() > 1e-3
     assert task.observation_size == env.observation_size + 28
 
 
 def test_a_meta_policy_of_another_character_or_task_is_refused(trained, tmp_path):
-    built, _, policy, path = trained
+    built, _, policy, _ = trained
     other = dataclasses.replace(
         CONFIG, physics=dataclasses.replace(CONFIG.physics, character="humanoid49")
     )
     item = {"policy": policy, "prior": None}
-    wrong = save_learner(tmp_path / "other", 1, {}, other, item)
+    wrong = save_learner(tmp_path / "other", 1, STATE, other, item)
     with pytest.raises(ConfigError, match=r"composite\.meta: .*humanoid49, expected humanoid28"):
         with_meta(_config(wrong), built)
-    getup = save_learner(tmp_path / "getup", 1, {}, Config(), item)
+    getup = save_learner(tmp_path / "getup", 1, STATE, Config(), item)
     with pytest.raises(ConfigError, match=r"composite\.meta: .*of the get-up task"):
         with_meta(_config(getup), built)
     goals = dataclasses.replace(
         CONFIG,
         composite=dataclasses.replace(CONFIG.composite, goals={"aiming": {}}),
     )
-    more = save_learner(tmp_path / "goals", 1, {}, goals, item)
+    more = save_learner(tmp_path / "goals", 1, STATE, goals, item)
     with pytest.raises(ConfigError, match=r"composite\.meta: .*goals aiming"):
         with_meta(_config(more), built)
