@@ -21,7 +21,7 @@ from getup_jax.tasks.composite import (
     Starts,
     link_state,
 )
-from getup_jax.tasks.goals.combine import make_goals
+from getup_jax.tasks.goals.combine import equipment_of, make_goals
 from getup_jax.tasks.groups import objective_weights, resolve_groups
 from getup_jax.tasks.reference_windows import make_references, unrolled
 from getup_jax.types import Engine, take
@@ -41,7 +41,7 @@ def build_composite(config: Config, log: Callable[[str], None]) -> BuiltComposit
     composite = config.composite
     if composite is None:
         raise ConfigError("composite: expected groups, got null")
-    character = load_character(config.physics)
+    character = load_character(config.physics, equipment=equipment_of(composite.goals))
     resolve_groups(composite, character)  # a mistake in them is told before the clips are read
     clips = load_clips(composite, character)
     for name, found in clips.items():
@@ -61,8 +61,6 @@ def assemble_composite(
     groups = resolve_groups(composite, character)
     engine = make_engine(character, config.physics)
     goals = make_goals(composite.goals, character, engine.control_dt)
-    if goals.balls:
-        raise ConfigError(f"composite.goals: {', '.join(goals.names)}: balls are not wired in yet")
     task = CompositeTask(engine, character, composite, groups, goals)
     objective_weights(composite, task.objectives)  # a mistake in them is told before anything long
     references = {

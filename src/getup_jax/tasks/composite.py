@@ -143,7 +143,8 @@ class CompositeTask:
         key, key_goals = jax.random.split(state.key)
         target = world.target_centre + world.target_scale * action
         target = jnp.clip(target, world.target_lower, world.target_upper)
-        physics = self.engine.step(state.physics, target)
+        balls = self.goals.command(state.goals, state.physics.kinematics)
+        physics = self.engine.step(state.physics, target, balls)
         finite = physics.kinematics.finite
         frame = jnp.where(finite[:, None, None], link_state(physics.kinematics), 0.0)
         history = jnp.concatenate([state.history[:, 1:], frame[:, None]], axis=1)
