@@ -149,6 +149,7 @@ def _refuse_getup_options(args: argparse.Namespace) -> None:
     """Options that only mean something for getting up."""
     given = {
         "--plot": args.plot is not None,
+        "--curves": bool(args.curves),
         "--blend": args.blend is not None,
         "--push": args.push is not None,
         "--start standing": args.start == "standing",
