@@ -118,6 +118,10 @@ def test_a_character_that_plays_the_clips_has_no_error():
         ("composite.groups.lower.clips=[sqat]", r"groups\.lower\.clips: no clip 'sqat'.*squat"),
         ("composite.groups.lower.links=[shin_l]", r"pelvis.*in no group"),
         ("composite.start_group=legs", r"composite\.start_group.*'upper', 'lower'"),
+        ("terrain={}", r"terrain: expected null with composite motion"),
+        ("composite.discriminator.minibatch_size=100", r"minibatch_size: .*a divisor of .*4096"),
+        ("composite.groups.upper.frame=rot", r"groups\.\*\.frame: .*'heading', 'root'"),
+        ("composite.groups.upper.history=9", r"groups\.\*\.history: .*0 to 3"),
         ("composite.weights={upper: 0.5}", r"composite\.weights: expected one of each of upper"),
     ],
 )

@@ -343,3 +343,13 @@ class Config:
     network: NetworkConfig = field(default_factory=NetworkConfig)
     ppo: PPOConfig = field(default_factory=PPOConfig)
     train: TrainConfig = field(default_factory=TrainConfig)
+
+    def __post_init__(self) -> None:
+        if self.composite is None:
+            return
+        flat = "null with composite motion, which is on a plane"
+        _require(self.terrain is None, "terrain", flat, self.terrain)
+        batch = self.ppo.num_envs * self.ppo.num_steps
+        size = self.composite.discriminator.minibatch_size
+        expected = f"a divisor of ppo.num_envs * ppo.num_steps = {batch}"
+        _require(batch % size == 0, "composite.discriminator.minibatch_size", expected, size)
