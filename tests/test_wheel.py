@@ -37,6 +37,9 @@ def test_an_installed_wheel_finds_its_files(tmp_path):
         archive.extractall(site)
     shipped = {p.relative_to(ROOT) for p in (ROOT / "assets").rglob("*") if p.is_file()}
     assert all((site / "getup_jax" / path).is_file() for path in shipped)
+    page = ROOT / "src" / "getup_jax" / "editor" / "page"
+    served = {p.relative_to(ROOT / "src") for p in page.rglob("*") if p.is_file()}
+    assert all((site / path).is_file() for path in served)
     environment = {**os.environ, "PYTHONPATH": str(site)}
     check = [sys.executable, "-c", CHECK, str(site)]
     subprocess.run(check, check=True, env=environment, cwd=tmp_path)

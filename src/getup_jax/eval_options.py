@@ -32,12 +32,7 @@ def eval_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
-    add(
-        "--ckpt",
-        metavar="PATH",
-        default="flat",
-        help="a run folder, a checkpoint, or the name of a shipped policy (default: flat)",
-    )
+    add_checkpoint(parser)
     add(
         "--episodes",
         type=positive,
@@ -58,6 +53,16 @@ def eval_parser() -> argparse.ArgumentParser:
     _add_conditions(parser.add_argument_group("harder conditions, each off by default"))
     _add_outputs(parser.add_argument_group("output files"))
     return parser
+
+
+def add_checkpoint(parser: argparse.ArgumentParser) -> None:
+    """The argument --ckpt."""
+    parser.add_argument(
+        "--ckpt",
+        metavar="PATH",
+        default="flat",
+        help="a run folder, a checkpoint, or the name of a shipped policy (default: flat)",
+    )
 
 
 def _add_conditions(group: argparse._ArgumentGroup) -> None:

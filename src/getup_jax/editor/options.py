@@ -6,6 +6,8 @@ import argparse
 import ipaddress
 from collections.abc import Sequence
 
+from getup_jax.eval_options import add_checkpoint
+
 PORT = 8421
 _TOKEN = 12  # characters at least
 
@@ -30,12 +32,7 @@ def edit_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
-    add(
-        "--ckpt",
-        metavar="PATH",
-        default="flat",
-        help="a run folder, a checkpoint, or the name of a shipped policy (default: flat)",
-    )
+    add_checkpoint(parser)
     add("--port", type=port, default=PORT, metavar="N", help=f"(default: {PORT}; 0: a free one)")
     add(
         "--host",
