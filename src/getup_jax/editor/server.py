@@ -24,14 +24,12 @@ from websockets.exceptions import ConnectionClosed
 from getup_jax import checkpoint
 from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.editor import messages
-from getup_jax.editor.export import export
-from getup_jax.editor.imports import curves_of
+from getup_jax.editor.answers import answer
 from getup_jax.editor.messages import Request
 from getup_jax.editor.scene import describe
 from getup_jax.editor.session import Session, error_message
 from getup_jax.editor.simulate import Simulator
 from getup_jax.editor.site import Site
-from getup_jax.motion.curve_file import dump, parse_text
 
 _MAX_BYTES = messages.MAX_FILE_BYTES + messages.MAX_TEXT_BYTES
 _MAX_PAGES = 16
@@ -198,26 +196,6 @@ class App:
             if not type(error).__module__.startswith("getup_jax."):
                 warnings.warn(f"{request.type}: {type(error).__name__}: {error}", stacklevel=2)
             box.put(error_message(request, error))
-
-
-def answer(request: Request, session: Session) -> str | bytes:
-    """The answer to a request that may take a while; runs in a thread of its own."""
-    header: dict[str, Any] = {"number": request.number}
-    if request.type == "load":
-        curve = parse_text(request.content, request.name)
-        curve.start_clip(session.simulator.starts.clips, session.simulator.character)
-        return json.dumps({"type": "curves", **header, "curves": [curve.plain()]})
-    if request.type == "import":
-        assert isinstance(request.content, bytes)
-        curves = curves_of(request.name, request.content, session.simulator.character)
-        return json.dumps({"type": "curves", **header, "curves": [c.plain() for c in curves]})
-    assert request.curve is not None
-    if request.type == "save":
-        name = f"{request.curve.name}.yaml"
-        return messages.pack({"type": "file", **header, "name": name}, dump(request.curve).encode())
-    content = export(session.motion(request), session.simulator.character, request.format)
-    name = f"{request.curve.name}.{request.format}"
-    return messages.pack({"type": "file", **header, "name": name}, content)
 
 
 class Outbox:
