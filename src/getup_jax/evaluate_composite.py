@@ -41,6 +41,7 @@ class CompositeEpisodes:
     fell: np.ndarray  # [N, T] bool, a fall or a failed simulation at this step
     goal_reward: np.ndarray  # [N, T, G] of the goal tasks
     goal_success: np.ndarray  # [N, G] share of the attempts that succeeded; NaN without attempts
+    meta_weight: np.ndarray | None = None  # [N, T, A] w of equation 10; None: no meta policy
 
 
 def evaluate_composite(args: argparse.Namespace, loaded: LoadedPolicy) -> int:
@@ -77,19 +78,24 @@ def run_composite(job: Job, policy: Any, number: int, seed: int) -> CompositeEpi
         state = env.init(world, key, number)
 
         def step(state: Any, _: None) -> tuple[Any, tuple[jax.Array, ...]]:
-            action = learner.act(policy, state.observation)
+            observation = state.observation
+            action = learner.act(policy, observation)
             state, output = env.advance(world, state, action)
             seen = env.kinematics(state)
             kept = (seen.link_position, seen.link_quaternion, seen.qpos, output.terminated)
-            return state, (*kept, output.reward[:, first:])
+            weight = learner.meta_weight(policy, observation)
+            weight = jnp.zeros((number, 0)) if weight is None else weight
+            return state, (*kept, output.reward[:, first:], weight)
 
         state, found = jax.lax.scan(step, state, None, length=steps)
         shares = list(env.success(state).values())
         success = jnp.stack(shares, axis=-1) if shares else jnp.zeros((number, 0))
-        return (*jax.tree.map(lambda x: jnp.swapaxes(x, 0, 1), found), success)
+        *found, weight = jax.tree.map(lambda x: jnp.swapaxes(x, 0, 1), found)
+        return (*found, success, weight)
 
     found = jax.jit(play)(jax.device_put(job.world), policy, jax.random.PRNGKey(seed))
-    return CompositeEpisodes(*(np.asarray(x) for x in found))
+    *found, weight = (np.asarray(x) for x in found)
+    return CompositeEpisodes(*found, meta_weight=weight if weight.size else None)
 
 
 def score_composite(task: BuiltComposite, episodes: CompositeEpisodes) -> dict[str, Any]:
@@ -112,11 +118,23 @@ def score_composite(task: BuiltComposite, episodes: CompositeEpisodes) -> dict[s
         }
     return {
         "goals": goals,
+        "meta_weight": _meta_weights(task, episodes),
         "imitation_error_m": errors,
         "ratio": max(means) / max(min(means), 1e-9),
         "fall_share": float(episodes.fell.any(axis=1).mean()),
         "episodes": len(episodes.fell),
     }
+
+
+def _meta_weights(task: BuiltComposite, episodes: CompositeEpisodes) -> dict[str, Any]:
+    """Mean and std of the meta policy's weights over the hinges of every group [C figure 8]."""
+    if episodes.meta_weight is None:
+        return {}
+    env, found = task.environment, {}
+    for group in env.groups:
+        own = episodes.meta_weight[..., np.isin(env.character.joint_link, group.links)]
+        found[group.name] = {"mean": float(own.mean()), "std": float(own.std())}
+    return found
 
 
 def _error(task: BuiltComposite, group: Group, motion: np.ndarray, clip: Clip) -> np.ndarray:
@@ -167,6 +185,8 @@ def _table(scores: dict[str, Any]) -> str:
     for name, goal in scores["goals"].items():
         share = "-" if goal["success"] is None else f"{100 * goal['success']:.0f} %"
         lines.append(f"{name:16} reward {goal['reward']:.3f}, reached {share}")
+    for name, weight in scores["meta_weight"].items():
+        lines.append(f"{name:16} weight of the meta policy {weight['mean']:.2f}")
     lines.append(f"largest / smallest {scores['ratio']:.2f}")
     lines.append(f"episodes with a fall {100 * scores['fall_share']:.0f} %")
     return "\n".join(lines)

@@ -80,7 +80,7 @@ class ActorCritic:
 
     def meta_weight(self, actor: Any, normalized: jax.Array) -> jax.Array | None:
         """The weights w [..., A] of a meta policy's action, in (0, 1); None without one."""
-        return self._heads(actor, normalized)[2]
+        return self._heads(actor, normalized)[2] if self.meta_size else None
 
     def _heads(
         self, actor: Any, normalized: jax.Array

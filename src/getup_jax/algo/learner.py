@@ -108,6 +108,10 @@ class Learner:
         """The mean action [..., A] for raw observations [..., O]; deterministic."""
         return self.model.mean(policy.actor, normalized(policy, observation))
 
+    def meta_weight(self, policy: PolicyState, observation: jax.Array) -> jax.Array | None:
+        """The weights [..., A] of a meta policy's action; None without one."""
+        return self.model.meta_weight(policy.actor, normalized(policy, observation))
+
     def value(self, learner: LearnerState, observation: jax.Array) -> jax.Array:
         """Values [..., K] in return units for raw observations [..., O]."""
         return self.model.value(learner, normalized(learner.policy, observation))
