@@ -24,6 +24,7 @@ examples:
   getup-train configs/flat.yaml --resume               continue where it stopped
   getup-train flat ppo.num_envs=256 seed=1 --run runs/seed1
                                                        change settings, keep the file
+  getup-train composite_wave_squat                     composite motion, see docs/composite.md
 
 A run folder holds config.yaml (every setting), metrics.jsonl and times.jsonl (one line an
 iteration) and checkpoints/. Ctrl-C and SIGTERM save and exit; a second Ctrl-C exits at once.
