@@ -23,7 +23,7 @@ LAYERS = [
     ["loop", "train"],
     ["conditions", "naturalness", "episodes", "scores", "score_table", "video", "eval_plot"],
     ["evaluate_composite"],
-    ["evaluate", "model_card", "export"],
+    ["evaluate", "model_card", "export", "search"],
     ["eval_options"],
     ["cli", "editor"],
 ]

@@ -41,6 +41,11 @@ def eval_main(argv: Sequence[str] | None = None) -> int:
     return _guard(_evaluate, eval_parser().parse_args(argv))
 
 
+def search_main(argv: Sequence[str] | None = None) -> int:
+    """`getup-search`; returns the exit code."""
+    return _guard(_search, argv)
+
+
 def motion_main(argv: Sequence[str] | None = None) -> int:
     """`getup-motion`; returns the exit code."""
     return _guard(_motion, argv)
@@ -69,6 +74,12 @@ def _evaluate(args: argparse.Namespace) -> int:
     from getup_jax.evaluate import evaluate_command
 
     return evaluate_command(args) or 0
+
+
+def _search(argv: Sequence[str] | None) -> int:
+    from getup_jax.search.command import parser, search_command
+
+    return search_command(parser().parse_intermixed_args(argv))
 
 
 def _motion(argv: Sequence[str] | None) -> int:

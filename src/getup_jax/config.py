@@ -107,6 +107,9 @@ class TaskConfig:
     head_clearance_m: float = 0.02  # the head is on the floor below this gap
     stand_start: float = 0.3  # share of episodes that start standing
     clip_start: float = 0.0  # share that starts along the reference clip, or one that fits
+    paths: str | None = (
+        None  # folder of getup-search: clip starts are at its states, where it has any
+    )
     curve_match_rad: float = 0.52  # largest gap between a curve's and a pose's torso angles
     focus: float = 0.0  # 0: starts are drawn evenly; towards 1: at the frontier of what is learned
     start_noise_rad: float = 0.0  # joint noise of the start poses
@@ -117,6 +120,11 @@ class TaskConfig:
         share = self.stand_start + self.clip_start
         _require(0 <= share <= 1, "task.stand_start + task.clip_start", "between 0 and 1", share)
         _require(0 <= self.focus < 1, "task.focus", "at least 0 and less than 1", self.focus)
+        _require(0 <= self.short_share < 1, "task.short_share", "0 to below 1", self.short_share)
+        _require(self.short_s > 0, "task.short_s", "more than 0", self.short_s)
+        _require(0 <= self.path_share <= 1, "task.path_share", "between 0 and 1", self.path_share)
+        ok = self.paths is None or self.clip_start > 0
+        _require(ok, "task.paths", "null where task.clip_start is 0", self.paths)
         _require(0 < self.filter <= 1, "task.filter", "more than 0 and at most 1", self.filter)
         now = self.lookahead_s[:1] == (0.0,)
         _require(now, "task.lookahead_s", "times that start with 0, the present", self.lookahead_s)
@@ -222,6 +230,7 @@ class PPOConfig:
     action_std: tuple[float, ...] = (0.6, 0.3)  # first and last stage
     stages: int = 5  # equal stages of the whole run, for both schedules
     target_clip_fraction: float | None = None  # adapt the learning rate to it; None: off
+    critic_first: int = 0  # iterations that leave the actor alone, after `train.init_from`
     normalize_observation: bool = True
     popart: bool = False  # normalise the value targets of every objective
 

@@ -6,21 +6,23 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tiny_task import CONFIG, getups
+from tiny_task import CONFIG, LATENT, getups
 
 from getup_jax.config import ConfigError
 from getup_jax.motion import curves
 from getup_jax.nets.prior_data import pose_conditions
-from getup_jax.tasks.clip_starts import ANGLE_MATCH_RAD, HEIGHT_MATCH_M, velocities
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
+from getup_jax.motion.align import FEATURE_SCALE
+from getup_jax.tasks.paths import FoundPath, load_path, save_path
 from getup_jax.tasks.reset_pool import angle_gap, build_pool, kind_shares
 
+ACTION = LATENT + 49
 TASK = dataclasses.replace(CONFIG.task, stand_start=0.2, clip_start=0.3, pool_size=60)
 
 
 def pool_of(character, engine, **changes):
     config = dataclasses.replace(TASK, **changes)
-    return build_pool(getups(character), character, engine, config, seed=0)
+    return build_pool(getups(character), character, engine, config, seed=0, action_size=ACTION)
 
 
 def rows(pool, kind: int, style: int) -> dict[str, np.ndarray]:
@@ -93,29 +95,86 @@ def test_starts_along_the_clip_move_like_it(pool, character):
     np.testing.assert_allclose(start["qvel"][:, 2], climb, atol=1e-5)
 
 
-def test_a_curve_alone_starts_at_frames_that_look_like_it(pool, character):
-    clip, curve = getups(character)
+def test_a_curve_alone_starts_along_the_motion_that_looks_most_like_it(pool, character):
+    _, curve = getups(character)
     start = rows(pool, CLIP, 1)
-    # the clip's frames are two: lying at time 0, and tipped up, which the slower curve is later
-    lying, tipped = clip.clip.qpos[:2]
-    early = start["time"] < 0.5
-    assert early.any()
-    assert not early.all()
-    frame = np.where(early[:, None], lying, tipped)
-    np.testing.assert_allclose(start["qpos"][:, 3:], frame[:, 3:], atol=1e-6)
-    target = np.asarray(curves.evaluate(jnp.asarray(curve.points), start["time"] / 2.0))
-    gap = np.abs(pose_conditions(frame, character) - target)
-    assert (gap < [HEIGHT_MATCH_M + 1e-3, ANGLE_MATCH_RAD + 1e-3, ANGLE_MATCH_RAD + 1e-3]).all()
-    # twice the clip's duration: half its pace
-    pace = velocities(clip.clip, character)[np.where(early, 0, 1)] / 2.0
-    np.testing.assert_allclose(start["qvel"], pace, atol=1e-5)
+    assert start["time"].max() > 0.5
+    target = np.asarray(curves.evaluate(jnp.asarray(curve.points), start["time"] / curve.duration))
+    gap = np.abs(pose_conditions(start["qpos"], character) - target)
+    assert (gap[:, 1:] < FEATURE_SCALE[1:] + 1e-3).all()
+    assert (gap[:, 0] < FEATURE_SCALE[0] + 0.1).all()  # the pose is put on the ground
+    # the hinges of all three frames are those of the neutral pose
+    neutral = np.tile(character.neutral_qpos[7:], (10, 1))
+    np.testing.assert_allclose(start["qpos"][:, 7:], neutral, atol=1e-6)
+    # a quarter turn in about two seconds; the pace follows the curve's, so not evenly
+    turn = np.abs(start["qvel"][:, 3:6]).max(axis=1)
+    assert 0.1 < turn.max() < 4.0
+
+
+def found_path(character, time: np.ndarray) -> FoundPath:
+    count = len(time)
+    return FoundPath(
+        qpos=np.tile(character.neutral_qpos, (count, 1)),
+        qvel=np.full((count, 55), 0.25),
+        action=np.tile(time[:, None], (1, ACTION)),
+        time=time,
+        task_reward=np.ones(count),
+        finished=True,
+        seed=3,
+    )
+
+
+def test_starts_along_the_way_are_found_states_where_there_are_any(character, engine, tmp_path):
+    style = getups(character)[1]
+    save_path(tmp_path, style, found_path(character, np.array([0.0, 0.2, 0.4, 0.6, 0.8])))
+    pool = pool_of(character, engine, paths=str(tmp_path), path_share=1.0)
+    start = rows(pool, CLIP, 1)
+    action = np.asarray(pool.action)[np.asarray(pool.table[CLIP, 0, 1])]
+    found = start["time"] < 0.9
+    assert found.any()
+    np.testing.assert_allclose(action[found], np.tile(start["time"][found, None], (1, ACTION)))
+    np.testing.assert_allclose(start["qvel"][found], 0.25)
+    neutral = np.tile(character.neutral_qpos, (found.sum(), 1))
+    np.testing.assert_allclose(start["qpos"][found], neutral, atol=1e-6)
+    assert np.isnan(action[~found]).all()
+    others = np.asarray(pool.action)[np.asarray(pool.table[:, 0, 0])]
+    assert np.isnan(others).all()
+
+
+def test_a_found_path_reads_as_it_was_written(character, tmp_path):
+    style = getups(character)[0]
+    path = found_path(character, np.linspace(0.0, 1.0, 5))
+    file = save_path(tmp_path, style, path)
+    assert file.name == "clip.3.npz"
+    for name, value in vars(load_path(file)).items():
+        np.testing.assert_array_equal(value, getattr(path, name))
+    assert list(path.near(0.5, 0.3)) == [1, 2, 3]
+
+
+def test_paths_that_cannot_be_used_say_why(character, engine, tmp_path):
+    with pytest.raises(ConfigError, match=r"task\.paths: no folder .*getup-search"):
+        pool_of(character, engine, paths=str(tmp_path / "none"))
+    style = getups(character)[0]
+    file = save_path(tmp_path, style, found_path(character, np.zeros(2)))
+    with pytest.raises(ConfigError, match="expected 56 positions and 70 actions, got 56 and 65"):
+        build_pool(
+            getups(character),
+            character,
+            engine,
+            dataclasses.replace(TASK, paths=str(tmp_path)),
+            seed=0,
+            action_size=70,
+        )
+    file.write_bytes(file.read_bytes()[:100])
+    with pytest.raises(ConfigError, match=r"clip\.3\.npz: not a path that getup-search wrote"):
+        pool_of(character, engine, paths=str(tmp_path))
 
 
 def test_a_curve_unlike_every_frame_starts_lying_instead(character, engine):
     clip, curve = getups(character)
     points = curve.points + np.array([0.5, 0.0, 0.0])
     curve = dataclasses.replace(curve, points=points)
-    pool = build_pool([clip, curve], character, engine, TASK, seed=0)
+    pool = build_pool([clip, curve], character, engine, TASK, seed=0, action_size=ACTION)
     start = rows(pool, CLIP, 1)
     np.testing.assert_array_equal(start["time"], 0.0)
     assert (start["qpos"][:, 2] < 0.15).all()
@@ -143,7 +202,7 @@ def test_a_curve_that_starts_unlike_every_pose_is_an_error(character, engine):
     with pytest.raises(
         ConfigError, match=r"'curve': .* 1\.0\d rad .*task\.curve_match_rad = 0\.52"
     ):
-        build_pool([clip, curve], character, engine, TASK, seed=0)
+        build_pool([clip, curve], character, engine, TASK, seed=0, action_size=ACTION)
 
 
 def test_a_wider_match_accepts_it(character, engine):
@@ -152,4 +211,6 @@ def test_a_wider_match_accepts_it(character, engine):
     points[0, 2] = 1.0
     curve = dataclasses.replace(curve, points=points)
     config = dataclasses.replace(TASK, curve_match_rad=1.2)
-    assert build_pool([clip, curve], character, engine, config, seed=0).table.shape == (3, 1, 2, 10)
+    assert build_pool(
+        [clip, curve], character, engine, config, seed=0, action_size=ACTION
+    ).table.shape == (3, 1, 2, 10)

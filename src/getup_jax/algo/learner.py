@@ -89,6 +89,9 @@ class Learner:
         )
         learner, samples, explained = estimate(self.model, learner, transition, self.config)
         improved, metrics = self._improve(learner, samples, stage, key_update)
+        if self.config.critic_first > 0:
+            wait = state.iteration < self.config.critic_first
+            improved = _critic_only(wait, learner, improved)
         learner = _unless_first(learner, improved)
         policy = observe(learner.policy, collected.transition.observation)
         metrics |= {
@@ -197,6 +200,23 @@ class Learner:
         metrics["ppo/action_std"] = jnp.mean(std)
         value_coefficient = self.config.value_coefficient
         return ppo.total_loss(terms, value_coefficient, self.config.entropy_coefficient), metrics
+
+
+def _critic_only(wait: jax.Array, learner: LearnerState, improved: LearnerState) -> LearnerState:
+    """The improved learner, with the old actor and rate scale as long as wait [] is true.
+
+    A policy that was trained before meets a critic that knows nothing yet.
+    """
+
+    def old(before: Any, after: Any) -> Any:
+        return jax.tree.map(lambda a, b: jnp.where(wait, a, b), before, after)
+
+    actor = old(learner.policy.actor, improved.policy.actor)
+    return dataclasses.replace(
+        improved,
+        policy=dataclasses.replace(improved.policy, actor=actor),
+        learning_rate_scale=old(learner.learning_rate_scale, improved.learning_rate_scale),
+    )
 
 
 def _unless_first(learner: LearnerState, improved: LearnerState) -> LearnerState:

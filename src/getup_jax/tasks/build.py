@@ -91,10 +91,10 @@ def assemble(
     )
     if site is None:
         terrain: Ground = Terrain.flat()
-        pool = build_pool(getups, character, engine, config.task, config.seed)
+        pool = build_pool(getups, character, engine, config.task, config.seed, action_size)
     else:
         terrain = jax.tree.map(jnp.asarray, site.ground.field())
-        flat = FlatStarts(getups, character, config.task, config.seed)
+        flat = FlatStarts(getups, character, config.task, config.seed, action_size)
         pool = build_region_pool(getups, flat, site, engine, config.task, log)
     log(f"start states: {len(pool.time)}")
     margin = config.task.target_margin_rad

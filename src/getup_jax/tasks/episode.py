@@ -51,6 +51,8 @@ class EpisodeState:
     head_steps: jax.Array  # [B] int32, steps in a row with the head on the floor
     record: Record
     key: jax.Array
+    # [B] s, time on the curve at which a short episode is cut, inf: at its end; None: all are
+    until: jax.Array | None = None
     # [3 R, G, bins] success of the batch's starts; see focus.py
     focus: jax.Array | None = None
     # Irregular ground only; None on a flat plane.

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from getup_jax.tasks.episode import CLIP
 from getup_jax.tasks.reset_pool import Pool
 
-BINS = 8  # parts of a curve
+BINS = 24  # parts of a curve: the passage that is missing is often a quarter of a second long
 RATE = 0.1  # share of an episode's result in its cell's running mean
 
 
@@ -57,18 +57,21 @@ def weights(learned: jax.Array, pool: Pool, duration: jax.Array, focus: float) -
 def frontier(learned: jax.Array, used: jax.Array, regions: int = 1) -> jax.Array:
     """How near [3 R, G, BINS] (0 to 1) every cell is to the frontier; used: it has starts.
 
-    The larger of 4 p (1 - p) and q - p, where p is the cell's success and q that of the next part
-    of the curve that has starts. After the last part comes success itself, and after a lying start
+    The larger of 4 p (1 - p) and q - p, where p is the cell's success and q the larger one of the
+    next two parts of the curve that have starts: from some starts nothing leads on, and those
+    before them must not wait. After the last part comes success itself, and after a lying start
     what starts along the curve, which only the first region has.
     """
     first_clip = CLIP * regions
-    following, near = jnp.ones(learned.shape[1:2]), []
+    following = after_that = jnp.ones(learned.shape[1:2])
+    near = []
     for part in reversed(range(BINS)):
-        near.append(following)
-        here = learned[first_clip, :, part]
-        following = jnp.where(used[first_clip, :, part], here, following)
+        near.append(jnp.maximum(following, after_that))
+        here, has_starts = learned[first_clip, :, part], used[first_clip, :, part]
+        after_that = jnp.where(has_starts, following, after_that)
+        following = jnp.where(has_starts, here, following)
     along = jnp.stack(near[::-1], axis=-1)
-    lying = jnp.broadcast_to(following[:, None], along.shape)
+    lying = jnp.broadcast_to(jnp.maximum(following, after_that)[:, None], along.shape)
     ahead = jnp.repeat(jnp.stack([lying, jnp.ones_like(along), along]), regions, axis=0)
     return jnp.maximum(4.0 * learned * (1.0 - learned), ahead - learned)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,9 +17,8 @@ from getup_jax.physics.terrain import Ground
 from getup_jax.rotation import angle, conjugate, multiply, rotate
 from getup_jax.rows import replace_rows
 from getup_jax.tasks import curriculum, focus, rewards
+from getup_jax.tasks.draws import Draw, draw_starts
 from getup_jax.tasks.episode import (
-    CLIP,
-    LYING,
     EpisodeState,
     Record,
     stands,
@@ -32,15 +30,6 @@ from getup_jax.tasks.reset_pool import Pool
 from getup_jax.types import Engine, StepOutput, take
 
 _RESET_CHUNK = 32  # episodes that start anew at once; a step rarely ends more of some hundred
-
-
-class _Draw(NamedTuple):
-    """What B episodes start from; int32."""
-
-    getup: jax.Array  # [B]
-    kind: jax.Array  # [B]
-    row: jax.Array  # [B] of the pool
-    region: jax.Array | None = None  # [B]; None on a flat plane
 
 
 @struct.dataclass
@@ -99,7 +88,7 @@ class GetUpTask:
         key_next, key_reset = jax.random.split(state.key)
         learned = self._learned(world, after, output)
         progress, output = self._progress(after, output)
-        drawn = self._draw(world, key_reset, action.shape[0], learned, progress)
+        drawn = draw_starts(self.config, world, key_reset, action.shape[0], learned, progress)
 
         def fresh(index: jax.Array) -> EpisodeState:
             return self._begin(world, jax.tree.map(lambda x: x[index], drawn)).replace(key=None)
@@ -123,10 +112,12 @@ class GetUpTask:
 
         learned and progress are the state's focus and curriculum.
         """
-        return self._begin(world, self._draw(world, key, num_envs, learned, progress))
+        drawn = draw_starts(self.config, world, key, num_envs, learned, progress)
+        return self._begin(world, drawn)
 
-    def _begin(self, world: World, drawn: _Draw) -> EpisodeState:
-        return self.start(world, drawn.getup, drawn.kind, drawn.row, region=drawn.region)
+    def _begin(self, world: World, drawn: Draw) -> EpisodeState:
+        state = self.start(world, drawn.getup, drawn.kind, drawn.row, region=drawn.region)
+        return state if drawn.lasts is None else state.replace(until=state.time + drawn.lasts)
 
     def _progress(
         self, state: EpisodeState, output: StepOutput
@@ -139,38 +130,6 @@ class GetUpTask:
         opened = jnp.full(len(success), progress.opened, jnp.float32)
         return progress, output.replace(metrics=output.metrics | {"regions_open": opened})
 
-    def _draw(
-        self,
-        world: World,
-        key: jax.Array,
-        num_envs: int,
-        learned: jax.Array | None,
-        progress: curriculum.Curriculum | None,
-    ) -> _Draw:
-        """What new episodes [B] start from."""
-        key_kind, key_style, key_row = jax.random.split(key, 3)
-        *_, num_styles, rows = world.pool.table.shape
-        draw = jax.random.uniform(key_kind, (num_envs,))
-        stand, clip = self.config.stand_start, self.config.clip_start
-        kind = jnp.where(draw < stand, 1, jnp.where(draw < stand + clip, 2, 0)).astype(jnp.int32)
-        region = None
-        if progress is not None:
-            region = curriculum.draw_region(progress, jax.random.fold_in(key, 0), num_envs)
-            # only the flat region has starts along a clip
-            kind = jnp.where((region > 0) & (kind == CLIP), LYING, kind)
-        if learned is not None:
-            weight = focus.weights(learned, world.pool, world.duration, self.config.focus)
-            getup, row = focus.draw(weight, focus.place_of(world.pool, kind, region), key_row)
-            return _Draw(getup, kind, row, region)
-        startable = world.pool.startable
-        if region is None or startable is None:
-            getup = jax.random.randint(key_style, (num_envs,), 0, num_styles)
-        else:
-            place = jax.random.randint(key_style, (num_envs,), 0, startable.count[region])
-            getup = startable.styles[region, place]
-        row = jax.random.randint(key_row, (num_envs,), 0, rows)
-        return _Draw(getup, kind, row, region)
-
     def _learned(self, world: World, state: EpisodeState, output: StepOutput) -> jax.Array | None:
         """The focus after the episodes that end with this step."""
         if state.focus is None:
@@ -180,7 +139,10 @@ class GetUpTask:
         place = focus.place_of(world.pool, state.kind, state.region)
         cell = (place, state.getup, focus.bin_of(begin))
         success = output.truncated & stands(state.record)
-        return focus.update(state.focus, cell, output.terminated | output.truncated, success)
+        ended = output.terminated | output.truncated
+        if state.until is not None:
+            ended &= jnp.isinf(state.until)  # a short one says nothing about success
+        return focus.update(state.focus, cell, ended, success)
 
     def start(
         self,
@@ -214,7 +176,11 @@ class GetUpTask:
         )
         # The filter keeps most of the last action, so the first target must be the start pose.
         angles = physics.kinematics.qpos[:, 7:]
-        state = state.replace(action=self._action_of(world, state, angles))
+        own = self.action_for(world, angles, self.targets(world, state)[:, 0])
+        if world.pool.action is not None:
+            given = world.pool.action[index]
+            own = jnp.where(jnp.isnan(given), own, given)
+        state = state.replace(action=own)
         return state.replace(observation=self._observe(world, state, self._posture(world, state)))
 
     def advance(
@@ -235,6 +201,8 @@ class GetUpTask:
         terminated = causes["low_reward"] | causes["head"] | causes["not_finite"]
         half_step = 0.5 * self.engine.control_dt
         end = state.duration + self.config.stand_time_s - half_step
+        if state.until is not None:
+            end = jnp.minimum(end, state.until - half_step)
         truncated = ~terminated & (state.time > end)
         state = self._record(world, state, posture, target, terms["task"])
         observation = jnp.where(finite[:, None], self._observe(world, state, posture), 0.0)
@@ -254,6 +222,9 @@ class GetUpTask:
 
     def _verdict(self, state: EpisodeState, truncated: jax.Array) -> dict[str, jax.Array]:
         episode = verdict(state, truncated, self._full_steps(state))
+        if state.until is not None:
+            full = jnp.isinf(state.until)
+            episode = {name: jnp.where(full, x, jnp.nan) for name, x in episode.items()}
         if state.region is None:
             return episode
         return episode | curriculum.by_region(episode, state.region)
@@ -269,11 +240,14 @@ class GetUpTask:
         target = pose + self.config.offset_scale * offset
         return jnp.clip(target, world.target_lower, world.target_upper)
 
-    def _action_of(self, world: World, state: EpisodeState, angles: jax.Array) -> jax.Array:
-        """The action [B, A] whose servo target is the pose angles [B, J], as near as it gets."""
+    def action_for(self, world: World, angles: jax.Array, condition: jax.Array) -> jax.Array:
+        """The action [B, A] whose servo target is the pose angles [B, J], as near as it gets.
+
+        condition [B, 3]: the curve values at that time.
+        """
         if world.prior is None:
             return (angles - self._neutral()) / self.config.offset_scale
-        latent = pose_prior.encode_action(world.prior, angles, self.targets(world, state)[:, 0])
+        latent = pose_prior.encode_action(world.prior, angles, condition)
         return jnp.concatenate([latent, jnp.zeros_like(angles)], axis=-1)
 
     def _neutral(self) -> jax.Array:

@@ -18,7 +18,15 @@ from getup_jax.physics.settle import settle
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 from getup_jax.tasks.falls import Starts, fall
-from getup_jax.tasks.reset_pool import FlatStarts, Pool, Startable, check_finite, kind_shares
+from getup_jax.tasks.reset_pool import (
+    FlatStarts,
+    FreeStarts,
+    Pool,
+    Startable,
+    check_finite,
+    given_actions,
+    kind_shares,
+)
 from getup_jax.tasks.stances import stand
 from getup_jax.tasks.start_cache import Request, cached_starts
 from getup_jax.types import Engine, PhysicsState
@@ -26,7 +34,6 @@ from getup_jax.types import Engine, PhysicsState
 _PLACE_CHUNK = 2048  # states that the engine makes at once: the native one keeps memory for each
 
 Log = Callable[[str], None]
-_Part = tuple[np.ndarray, np.ndarray, np.ndarray]  # qpos [n, 7 + J], qvel [n, 6 + J], time [n]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -69,8 +76,10 @@ def build_region_pool(
                 # a style that cannot start here is never drawn, but its rows must hold something
                 index = _least_used(fair if fair.any() else own[kind], used, rows, rng)
                 time = np.full(rows, getup.duration if kind == STANDING else 0.0)
-                table[kind, region, style] = sum(len(p[2]) for p in parts) + np.arange(rows)
-                parts.append((irregular[kind].qpos[index], irregular[kind].qvel[index], time))
+                table[kind, region, style] = sum(len(p) for p in parts) + np.arange(rows)
+                none = np.full((rows, flat.action_size), np.nan)
+                chosen = irregular[kind].qpos[index], irregular[kind].qvel[index]
+                parts.append(FreeStarts(*chosen, time, none))
         table[CLIP, region] = table[LYING, region]
     order = np.argsort(~startable, axis=1, kind="stable").astype(np.int32)
     count = startable.sum(axis=1).astype(np.int32)
@@ -78,14 +87,19 @@ def build_region_pool(
 
 
 def _pool(
-    parts: list[_Part], table: np.ndarray, startable: Startable, site: Site, engine: Engine
+    parts: list[FreeStarts], table: np.ndarray, startable: Startable, site: Site, engine: Engine
 ) -> Pool:
-    qpos, qvel, time = (np.concatenate(part) for part in zip(*parts, strict=True))
-    site.ground.check_spawn(qpos[:, :2])
-    physics = place_in_chunks(engine, qpos, qvel)
-    check_finite(physics, qpos)
-    time = jnp.asarray(time, jnp.float32)
-    return Pool(physics=physics, time=time, table=jnp.asarray(table), startable=startable)
+    starts = FreeStarts.join(parts)
+    site.ground.check_spawn(starts.qpos[:, :2])
+    physics = place_in_chunks(engine, starts.qpos, starts.qvel)
+    check_finite(physics, starts.qpos)
+    return Pool(
+        physics=physics,
+        time=jnp.asarray(starts.time, jnp.float32),
+        table=jnp.asarray(table),
+        action=given_actions(starts),
+        startable=startable,
+    )
 
 
 def _least_used(
@@ -140,13 +154,15 @@ def _irregular_starts(site: Site, config: TaskConfig, log: Log) -> dict[int, Sta
 
 def _on_the_flat(
     flat: FlatStarts, site: Site, table: np.ndarray, rng: np.random.Generator
-) -> _Part:
+) -> FreeStarts:
     """The flat region's starts, the first in the pool; their rows are written into the table."""
-    qpos, qvel, time, table[:, 0] = flat.make(table.shape[-1])
-    qpos[:, :2] += site.ground.draw_spawn(0, len(qpos), rng)
+    starts, table[:, 0] = flat.make(table.shape[-1])
+    starts.qpos[:, :2] += site.ground.draw_spawn(0, len(starts), rng)
     lying = np.unique(table[LYING, 0])
-    qpos[lying], qvel[lying] = settle(site.character, qpos[lying], flat.config.settle_s)
-    return qpos, qvel, time
+    starts.qpos[lying], starts.qvel[lying] = settle(
+        site.character, starts.qpos[lying], flat.config.settle_s
+    )
+    return starts
 
 
 def _fits(

@@ -1,4 +1,4 @@
-"""Start states, made once: settled lying poses, standing, and poses along the reference clips."""
+"""Start states, made once: settled lying poses, standing, and states along the way between them."""
 
 from __future__ import annotations
 
@@ -16,14 +16,33 @@ from getup_jax.motion.clips import GetUp
 from getup_jax.motion.features import FeatureLinks, features
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.settle import lift_to_ground, settle
-from getup_jax.tasks.clip_starts import ClipFrames, velocities
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
+from getup_jax.tasks.paths import FoundPath, load_paths
+from getup_jax.tasks.references import Reference, make_references, velocities
 from getup_jax.types import Engine, PhysicsState
 
 _DROP_M = 0.01  # lying poses are dropped from this height
 _SINK_M = 0.001  # the others touch the ground, as a body at rest does
+_NEAR_S = 0.1  # a found state stands for the curve's times that are this close
 
-_Start = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+@dataclasses.dataclass
+class FreeStarts:
+    """P start states that no engine has seen yet."""
+
+    qpos: np.ndarray  # [P, 7 + J]
+    qvel: np.ndarray  # [P, 6 + J]
+    time: np.ndarray  # [P] s since the curve's start
+    action: np.ndarray  # [P, A] filtered; NaN: what asks for the start's own pose
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @classmethod
+    def join(cls, parts: Sequence[FreeStarts]) -> FreeStarts:
+        """All of them in one, in their order."""
+        fields = [f.name for f in dataclasses.fields(cls)]
+        return cls(**{f: np.concatenate([getattr(part, f) for part in parts]) for f in fields})
 
 
 @struct.dataclass
@@ -41,11 +60,17 @@ class Pool:
     physics: PhysicsState  # [P] rows
     time: jax.Array  # [P] s since the curve's start, for a duration of 1 x T
     table: jax.Array  # [3, R, G, M] int32 rows of every kind of start, region and style
+    action: jax.Array | None = None  # [P, A] filtered, NaN: the pose's own; None: all are
     startable: Startable | None = None  # None, a flat plane: every style can start everywhere
 
 
 def build_pool(
-    getups: Sequence[GetUp], character: CharacterSpec, engine: Engine, config: TaskConfig, seed: int
+    getups: Sequence[GetUp],
+    character: CharacterSpec,
+    engine: Engine,
+    config: TaskConfig,
+    seed: int,
+    action_size: int,
 ) -> Pool:
     """Make the start states of all kinds that the config asks for.
 
@@ -53,16 +78,23 @@ def build_pool(
     """
     kinds = sum(share > 0 for share in kind_shares(config))
     rows = max(1, config.pool_size // max(1, len(getups) * kinds))
-    qpos, qvel, time, table = FlatStarts(getups, character, config, seed).make(rows)
+    starts, table = FlatStarts(getups, character, config, seed, action_size).make(rows)
     lying = np.unique(table[LYING])
-    qpos[lying], qvel[lying] = settle(character, qpos[lying], config.settle_s)
-    physics = engine.place(qpos, qvel)
-    check_finite(physics, qpos)
+    starts.qpos[lying], starts.qvel[lying] = settle(character, starts.qpos[lying], config.settle_s)
+    physics = engine.place(starts.qpos, starts.qvel)
+    check_finite(physics, starts.qpos)
     return Pool(
         physics=physics,
-        time=jnp.asarray(time, jnp.float32),
+        time=jnp.asarray(starts.time, jnp.float32),
         table=jnp.asarray(table[:, None]),
+        action=given_actions(starts),
     )
+
+
+def given_actions(starts: FreeStarts) -> jax.Array | None:
+    """The pool's `action`."""
+    given = ~np.isnan(starts.action)
+    return jnp.asarray(starts.action, jnp.float32) if given.any() else None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -73,31 +105,48 @@ class FlatStarts:
     character: CharacterSpec
     config: TaskConfig
     seed: int
+    action_size: int
 
-    def make(self, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """qpos [P, 7 + J], qvel [P, 6 + J], time [P] and the table [3, G, rows] of their rows.
+    def make(self, rows: int) -> tuple[FreeStarts, np.ndarray]:
+        """P start states and the table [3, G, rows] of their rows.
 
         Lying starts hang just above the ground; the caller lets them settle.
         """
         counts = [rows if share > 0 else 1 for share in kind_shares(self.config)]
-        poses = [g.clip.qpos[0] for g in self.getups if g.clip is not None]
-        rng = np.random.default_rng(self.seed)
-        frames = None
-        if self.config.clip_start > 0:
-            frames = ClipFrames.of(self.getups, self.character)
-        make = _StartMaker(self.character, self.config, rng, poses, frames)
-        starts, table, offset = [], np.zeros((3, len(self.getups), rows), np.int32), 0
+        make = self._maker()
+        parts, table, offset = [], np.zeros((3, len(self.getups), rows), np.int32), 0
         for kind, count in enumerate(counts):
-            for index, getup in enumerate(self.getups):
-                starts.append(make.start(kind, getup, count))
-                table[kind, index] = offset + np.arange(rows) % count
+            for style in range(len(self.getups)):
+                parts.append(make.start(kind, style, count))
+                table[kind, style] = offset + np.arange(rows) % count
                 offset += count
-        qpos, qvel, time = (np.concatenate(part) for part in zip(*starts, strict=True))
+        starts = FreeStarts.join(parts)
         lying = np.unique(table[LYING])
-        standing = np.arange(len(lying), len(qpos))
+        free = np.isnan(starts.action).all(axis=1)  # the others have their contacts already
+        free[lying] = False
+        qpos = starts.qpos
         qpos[lying] = lift_to_ground(self.character, qpos[lying], _DROP_M)
-        qpos[standing] = lift_to_ground(self.character, qpos[standing], -_SINK_M)
-        return qpos, qvel, time, table
+        qpos[free] = lift_to_ground(self.character, qpos[free], -_SINK_M)
+        return starts, table
+
+    def _maker(self) -> _StartMaker:
+        getups, character, config = self.getups, self.character, self.config
+        references: Sequence[Reference | None] = [None] * len(getups)
+        paths: Sequence[FoundPath | None] = [None] * len(getups)
+        if config.clip_start > 0:
+            references = make_references(getups, character)
+            if config.paths is not None:
+                size = character.num_joints, self.action_size
+                paths = load_paths(config.paths, getups, *size)
+        return _StartMaker(
+            getups=getups,
+            character=character,
+            config=config,
+            rng=np.random.default_rng(self.seed),
+            references=references,
+            paths=paths,
+            action_size=self.action_size,
+        )
 
 
 def kind_shares(config: TaskConfig) -> tuple[float, float, float]:
@@ -108,38 +157,48 @@ def kind_shares(config: TaskConfig) -> tuple[float, float, float]:
 
 @dataclasses.dataclass(frozen=True)
 class _StartMaker:
-    """Makes qpos [n, 7 + J], qvel [n, 6 + J] and time [n] of n start states of one style."""
+    """Makes start states of one kind and style."""
 
+    getups: Sequence[GetUp]
     character: CharacterSpec
     config: TaskConfig
     rng: np.random.Generator
-    lying_poses: list[np.ndarray]  # first poses of all reference motions
-    frames: ClipFrames | None  # of all reference motions, where starts along them are asked for
+    references: Sequence[Reference | None]  # [G]
+    paths: Sequence[FoundPath | None]  # [G]
+    action_size: int
 
-    def start(self, kind: int, getup: GetUp, count: int) -> _Start:
+    def start(self, kind: int, style: int, count: int) -> FreeStarts:
+        getup, reference = self.getups[style], self.references[style]
         if kind == STANDING:
-            qpos = self._noisy(np.tile(self.character.neutral_qpos, (count, 1)))
-            return qpos, self._at_rest(qpos), np.full(count, getup.duration)
-        along = self._along(getup, count) if kind == CLIP else None
-        if along is not None:
-            return along
+            neutral = np.tile(self.character.neutral_qpos, (count, 1))
+            return self._at_rest(self._noisy(neutral), getup.duration)
+        if kind == CLIP and reference is not None and len(reference.starts):
+            return self._found(self._along(reference, count), self.paths[style])
         fitting = self._fitting(getup)
-        qpos = self._noisy(
-            np.stack([fitting[i] for i in self.rng.integers(len(fitting), size=count)])
-        )
-        return qpos, self._at_rest(qpos), np.zeros(count)
+        chosen = self.rng.integers(len(fitting), size=count)
+        return self._at_rest(self._noisy(np.stack([fitting[i] for i in chosen])), 0.0)
 
-    def _along(self, getup: GetUp, count: int) -> _Start | None:
-        """Random frames of the get-up's motion, or for a curve alone frames that look like it."""
-        if getup.clip is None:
-            return self.frames and self.frames.along(getup, count, self.rng)
-        frame = self.rng.integers(0, len(getup.clip.qpos) - 1, size=count)
-        qvel = velocities(getup.clip, self.character)[frame]
-        return getup.clip.qpos[frame], qvel, frame / getup.clip.fps
+    def _along(self, reference: Reference, count: int) -> FreeStarts:
+        """Random frames of the motion."""
+        frame = self.rng.choice(reference.starts, size=count)
+        qvel = velocities(reference.clip, self.character)[frame]
+        time = frame / reference.clip.fps
+        return FreeStarts(reference.clip.qpos[frame], qvel, time, self._no_action(count))
+
+    def _found(self, starts: FreeStarts, path: FoundPath | None) -> FreeStarts:
+        """The starts, with those replaced that a found state is near to in time."""
+        for row, time in enumerate(starts.time) if path is not None else ():
+            near = path.near(time, _NEAR_S)
+            if len(near) and self.rng.random() < self.config.path_share:
+                chosen = self.rng.choice(near)
+                for field in dataclasses.fields(starts):
+                    getattr(starts, field.name)[row] = getattr(path, field.name)[chosen]
+        return starts
 
     def _fitting(self, getup: GetUp) -> list[np.ndarray]:
         """Lying poses whose torso angles are near the curve's first ones [P 5.2]."""
-        poses = self.lying_poses if getup.clip is None else [getup.clip.qpos[0]]
+        clips = [g.clip for g in (self.getups if getup.clip is None else [getup])]
+        poses = [clip.qpos[0] for clip in clips if clip is not None]
         gaps = [angle_gap(pose, getup, self.character) for pose in poses]
         limit = self.config.curve_match_rad
         fitting = [pose for pose, gap in zip(poses, gaps, strict=True) if gap <= limit]
@@ -152,8 +211,13 @@ class _StartMaker:
             )
         return fitting
 
-    def _at_rest(self, qpos: np.ndarray) -> np.ndarray:
-        return np.zeros((len(qpos), self.character.model.nv))
+    def _at_rest(self, qpos: np.ndarray, time: float) -> FreeStarts:
+        count = len(qpos)
+        qvel = np.zeros((count, self.character.model.nv))
+        return FreeStarts(qpos, qvel, np.full(count, time), self._no_action(count))
+
+    def _no_action(self, count: int) -> np.ndarray:
+        return np.full((count, self.action_size), np.nan)
 
     def _noisy(self, qpos: np.ndarray) -> np.ndarray:
         """Joint noise within the limits, and any heading."""

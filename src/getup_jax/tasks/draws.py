@@ -1,0 +1,87 @@
+"""What new episodes start from while training: kind of start, style, row of the pool, length."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import jax
+import jax.numpy as jnp
+
+from getup_jax.config import TaskConfig
+from getup_jax.tasks import curriculum, focus
+from getup_jax.tasks.episode import CLIP, LYING, STANDING
+from getup_jax.tasks.reset_pool import Pool
+
+
+class Draw(NamedTuple):
+    """What B episodes start from."""
+
+    getup: jax.Array  # [B] int32
+    kind: jax.Array  # [B] int32
+    row: jax.Array  # [B] int32, of the pool
+    region: jax.Array | None = None  # [B] int32; None on a flat plane
+    lasts: jax.Array | None = None  # [B] s at most, inf: to the end; None: all of them are
+
+
+class Starts(Protocol):
+    """The part of the task's world that draws need."""
+
+    @property
+    def pool(self) -> Pool:
+        """The start states."""
+        ...
+
+    @property
+    def duration(self) -> jax.Array:
+        """[G] s."""
+        ...
+
+
+def draw_starts(
+    config: TaskConfig,
+    world: Starts,
+    key: jax.Array,
+    num_envs: int,
+    learned: jax.Array | None,
+    progress: curriculum.Curriculum | None,
+) -> Draw:
+    """Starts of B = num_envs episodes; learned is the focus of `focus.py`, None: even draws."""
+    key_kind, key_style, key_row = jax.random.split(key, 3)
+    kind, region = _places(config, key, key_kind, num_envs, progress)
+    lasts = None
+    if config.short_share > 0:
+        chance = jax.random.uniform(jax.random.fold_in(key, 1), (num_envs,))
+        short = (chance < config.short_share) & (kind != STANDING)
+        lasts = jnp.where(short, config.short_s, jnp.inf)
+    if learned is not None:
+        weight = focus.weights(learned, world.pool, world.duration, config.focus)
+        getup, row = focus.draw(weight, focus.place_of(world.pool, kind, region), key_row)
+        return Draw(getup, kind, row, region, lasts)
+    *_, num_styles, rows = world.pool.table.shape
+    startable = world.pool.startable
+    if region is None or startable is None:
+        getup = jax.random.randint(key_style, (num_envs,), 0, num_styles)
+    else:
+        place = jax.random.randint(key_style, (num_envs,), 0, startable.count[region])
+        getup = startable.styles[region, place]
+    row = jax.random.randint(key_row, (num_envs,), 0, rows)
+    return Draw(getup, kind, row, region, lasts)
+
+
+def _places(
+    config: TaskConfig,
+    key: jax.Array,
+    key_kind: jax.Array,
+    num_envs: int,
+    progress: curriculum.Curriculum | None,
+) -> tuple[jax.Array, jax.Array | None]:
+    """Kinds of start [B] and regions [B], None on a flat plane."""
+    draw = jax.random.uniform(key_kind, (num_envs,))
+    stand, clip = config.stand_start, config.clip_start
+    kind = jnp.where(draw < stand, STANDING, jnp.where(draw < stand + clip, CLIP, LYING))
+    kind = kind.astype(jnp.int32)
+    if progress is None:
+        return kind, None
+    region = curriculum.draw_region(progress, jax.random.fold_in(key, 0), num_envs)
+    # only the flat region has starts along a clip
+    return jnp.where((region > 0) & (kind == CLIP), LYING, kind), region
