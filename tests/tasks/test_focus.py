@@ -14,21 +14,22 @@ from getup_jax.tasks.reset_pool import Startable
 
 
 def test_parts_of_the_curve():
-    begin = jnp.asarray([0.0, 0.124, 0.125, 0.99, 1.0, 1.3])
-    np.testing.assert_array_equal(focus.bin_of(begin), [0, 0, 1, 7, 7, 7])
+    begin = jnp.asarray([0.0, 0.041, 0.042, 0.99, 1.0, 1.3])
+    np.testing.assert_array_equal(focus.bin_of(begin), [0, 0, 1, 23, 23, 23])
 
 
 def test_the_frontier_is_before_what_is_solved_and_where_success_is_uncertain():
     learned = np.zeros((3, 2, focus.BINS), np.float32)
-    learned[CLIP, 0] = [0.0, 0.0, 0.0, 0.0, 0.3, 1.0, 1.0, 1.0]
+    learned[CLIP, 0, 4:] = 1.0
+    learned[CLIP, 0, 4] = 0.3
     used = np.ones(learned.shape, bool)
     used[CLIP, 0, 3] = False
     near = np.asarray(focus.frontier(jnp.asarray(learned), jnp.asarray(used)))
-    # part 4: 4 p (1 - p) = .84 > 1 - .3; part 2: the next part with starts is 4
-    np.testing.assert_allclose(near[CLIP, 0], [0, 0, 0.3, 0.3, 0.84, 0, 0, 0], atol=1e-6)
+    # part 4: 4 p (1 - p) = .84 > 1 - .3; the next two parts with starts after 2 are 4 and 5
+    np.testing.assert_allclose(near[CLIP, 0, :6], [0, 0.3, 1.0, 1.0, 0.84, 0], atol=1e-6)
     np.testing.assert_allclose(near[LYING, 0], 0.0)  # the first part is hopeless yet
     np.testing.assert_allclose(near[STANDING, 0], 1.0)
-    np.testing.assert_allclose(near[CLIP, 1], [0, 0, 0, 0, 0, 0, 0, 1])
+    np.testing.assert_allclose(near[CLIP, 1], [0] * (focus.BINS - 2) + [1, 1])
     learned[CLIP, 0, 0] = 0.9
     learned[LYING, 0, 0] = 0.2
     near = np.asarray(focus.frontier(jnp.asarray(learned), jnp.asarray(used)))
@@ -41,10 +42,8 @@ def test_weights_follow_the_frontier_of_the_entrys_cell(built):
     weight = np.asarray(focus.weights(learned, pool, duration, 0.8))
     assert weight.shape == pool.table[:, 0].shape
     np.testing.assert_allclose(weight[STANDING], 0.2, atol=1e-6)
-    last = np.asarray(
-        pool.time[pool.table[CLIP, 0, 0]]
-    )  # of a clip of one second with frames at 0, 0.5
-    np.testing.assert_allclose(weight[CLIP, 0], np.where(last > 0.25, 1.0, 0.2), atol=1e-6)
+    # the clip of one second has frames at 0 and .5, which are all the parts there are
+    np.testing.assert_allclose(weight[CLIP, 0], 1.0, atol=1e-6)
 
 
 def test_draws_are_in_proportion_to_the_weights():
@@ -68,7 +67,7 @@ def test_a_cell_moves_to_its_episodes_results_and_the_others_stay():
     assert after[0, 0, 3] == pytest.approx(0.5)
     assert after[1, 1, 0] == pytest.approx(0.5 + focus.RATE * 0.5)
     assert after[2, 1, 7] == 0.5
-    assert (np.delete(after.ravel(), [3, 24]) == 0.5).all()
+    assert (np.delete(after.ravel(), [3, 3 * focus.BINS]) == 0.5).all()
 
 
 def test_the_task_follows_the_success_of_its_starts(character):
@@ -103,3 +102,18 @@ def test_styles_that_cannot_start_in_a_region_have_no_weight(built):
     kind, region = jnp.asarray([LYING, STANDING, CLIP]), jnp.asarray([1, 0, 1])
     np.testing.assert_array_equal(focus.place_of(pool, kind, region), 2 * kind + region)
     np.testing.assert_array_equal(focus.place_of(pool, kind, None), kind)
+
+
+def test_short_episodes_end_early_and_say_nothing_about_success(character):
+    task = dataclasses.replace(CONFIG.task, focus=0.9, short_share=0.999, short_s=0.3)
+    built = tiny_task(character, dataclasses.replace(CONFIG, task=task))
+    env, world = built.environment, built.world
+    state = env.init(world, jax.random.PRNGKey(0), 8)
+    short = np.asarray(jnp.isfinite(state.until))
+    np.testing.assert_array_equal(short, np.asarray(state.kind) != STANDING)
+    assert short.any()
+    state = state.replace(time=jnp.where(short, state.until, state.time), focus=state.focus + 0.5)
+    after, output = jax.jit(env.step)(world, state, jnp.zeros((8, env.action_size)))
+    np.testing.assert_array_equal(output.truncated, short)
+    assert np.isnan(np.asarray(output.episode["return_rate"])[short]).all()
+    np.testing.assert_array_equal(after.focus, 0.5)

@@ -80,7 +80,7 @@ def test_a_style_that_nothing_fits_is_left_out_of_the_region(uneven, site, cache
     odd[0, 1:] = np.pi / 2, np.pi / 2  # no rag-doll lies upright
     styles, log = [clip, dataclasses.replace(curve, points=odd, clip=clip.clip)], []
     engine = NativeEngine(site.character, CONFIG.physics)
-    flat = region_pool.FlatStarts([clip, clip], load_character(CONFIG.physics), TASK, 0)
+    flat = region_pool.FlatStarts([clip, clip], load_character(CONFIG.physics), TASK, 0, 65)
     pool = region_pool.build_region_pool(styles, flat, site, engine, TASK, log.append)
     np.testing.assert_array_equal(pool.startable.count, [2, 1, 1, 1])
     np.testing.assert_array_equal(pool.startable.styles[1:, 0], 0)

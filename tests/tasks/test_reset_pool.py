@@ -10,9 +10,9 @@ from tiny_task import CONFIG, LATENT, getups
 
 from getup_jax.config import ConfigError
 from getup_jax.motion import curves
+from getup_jax.motion.align import FEATURE_SCALE
 from getup_jax.nets.prior_data import pose_conditions
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
-from getup_jax.motion.align import FEATURE_SCALE
 from getup_jax.tasks.paths import FoundPath, load_path, save_path
 from getup_jax.tasks.reset_pool import angle_gap, build_pool, kind_shares
 
@@ -102,7 +102,7 @@ def test_a_curve_alone_starts_along_the_motion_that_looks_most_like_it(pool, cha
     target = np.asarray(curves.evaluate(jnp.asarray(curve.points), start["time"] / curve.duration))
     gap = np.abs(pose_conditions(start["qpos"], character) - target)
     assert (gap[:, 1:] < FEATURE_SCALE[1:] + 1e-3).all()
-    assert (gap[:, 0] < FEATURE_SCALE[0] + 0.1).all()  # the pose is put on the ground
+    assert (gap[:, 0] < FEATURE_SCALE[0] + 0.2).all()  # the pose is put on the ground
     # the hinges of all three frames are those of the neutral pose
     neutral = np.tile(character.neutral_qpos[7:], (10, 1))
     np.testing.assert_allclose(start["qpos"][:, 7:], neutral, atol=1e-6)

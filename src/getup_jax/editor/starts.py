@@ -78,7 +78,8 @@ class Starts:
             own = dataclasses.replace(curve, values=_first_angles(clip, self.character))
             getups = own.getups(clip)[:1]
             engine = self._task.environment.engine
-            return build_pool(getups, self.character, engine, self._config, self._seed)
+            size = self._task.environment.action_size
+            return build_pool(getups, self.character, engine, self._config, self._seed, size)
         return self._on_ground(curve, place)
 
     def _on_ground(self, curve: CurveFile, place: Place) -> Pool:

@@ -15,8 +15,8 @@ from getup_jax.motion.events import link_positions
 from getup_jax.search.sampling import Population, Reference, Sampler, Settings, Window
 from getup_jax.tasks.build import BuiltTask
 from getup_jax.tasks.paths import FoundPath
-from getup_jax.tasks.references import make_references
 from getup_jax.tasks.references import Reference as Motion
+from getup_jax.tasks.references import make_references
 
 # From the one that most often got far to the one that helps out.
 ROUNDS = (
@@ -125,7 +125,9 @@ class Finder:
             time = number * settings.steps * dt
             if time >= end or reward[number] <= FOLLOWS:
                 continue
-            chosen = _ancestors([m.window.parent for m in moments[number : number + lag]])
+            chosen = _ancestors(
+                [np.asarray(m.window.parent) for m in moments[number : number + lag]]
+            )
             states = (x[chosen] for x in (moment.qpos, moment.qvel, moment.action))
             same = np.ones(len(chosen))
             parts.append((*states, time * same, reward[number] * same))

@@ -122,7 +122,7 @@ class FlatStarts:
                 offset += count
         starts = FreeStarts.join(parts)
         lying = np.unique(table[LYING])
-        free = np.isnan(starts.action).all(axis=1)  # the others have their contacts already
+        free = np.asarray(np.isnan(starts.action).all(axis=1))
         free[lying] = False
         qpos = starts.qpos
         qpos[lying] = lift_to_ground(self.character, qpos[lying], _DROP_M)
@@ -187,7 +187,9 @@ class _StartMaker:
 
     def _found(self, starts: FreeStarts, path: FoundPath | None) -> FreeStarts:
         """The starts, with those replaced that a found state is near to in time."""
-        for row, time in enumerate(starts.time) if path is not None else ():
+        if path is None:
+            return starts
+        for row, time in enumerate(starts.time):
             near = path.near(time, _NEAR_S)
             if len(near) and self.rng.random() < self.config.path_share:
                 chosen = self.rng.choice(near)
