@@ -286,6 +286,7 @@ def test_export_copies_only_the_policy(saved, tmp_path):
     assert_same(loaded.policy, original.policy)
     assert_same(loaded.prior, original.prior)
     assert dataclasses.replace(loaded.config) == original.config
+    assert loaded.config.train.init_from is None
     with pytest.raises(CheckpointError, match="has no item 'learner'"):
         restore_learner(exported, make_state(0))
 

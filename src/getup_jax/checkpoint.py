@@ -102,12 +102,18 @@ def load_policy(path: str | Path) -> LoadedPolicy:
 
 
 def export_policy(source: str | Path, destination: str | Path) -> Path:
-    """Copy only the policy item of a checkpoint to a folder that `load_policy` reads."""
+    """Copy only the policy item of a checkpoint to a folder that `load_policy` reads.
+
+    Its config names no file that only the training's machine has: no found paths, no earlier run.
+    """
     loaded, destination = load_policy(source), Path(destination)
     if destination.exists() and not manifest.is_checkpoint(destination):
         raise CheckpointError(f"{destination}: exists and is no checkpoint; choose another folder")
     items = {POLICY: {"policy": loaded.policy, "prior": loaded.prior}}
-    _write(destination, items, loaded.config, loaded.metadata, MAX_EXPORT_BYTES)
+    task = dataclasses.replace(loaded.config.task, paths=None)
+    train = dataclasses.replace(loaded.config.train, init_from=None)
+    config = dataclasses.replace(loaded.config, task=task, train=train)
+    _write(destination, items, config, loaded.metadata, MAX_EXPORT_BYTES)
     return destination
 
 
