@@ -107,7 +107,8 @@ class TaskConfig:
     head_clearance_m: float = 0.02  # the head is on the floor below this gap
     stand_start: float = 0.3  # share of episodes that start standing
     clip_start: float = 0.0  # share that starts along the reference clip, or one that fits
-    paths: str | None = None  # folder of getup-search; clip starts are at the states in it
+    # folder of getup-search, or `authored`, the shipped one; clip starts are at the states in it
+    paths: str | None = None
     path_share: float = 0.6  # share of the clip starts that are, where there are states
     short_share: float = 0.0  # share of the lying and clip starts whose episodes are cut short ...
     short_s: float = 1.5  # ... after this long: more tries of what comes next for the same steps

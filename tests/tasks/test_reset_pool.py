@@ -11,9 +11,11 @@ from tiny_task import CONFIG, LATENT, getups
 from getup_jax.config import ConfigError
 from getup_jax.motion import curves
 from getup_jax.motion.align import FEATURE_SCALE
+from getup_jax.motion.clips import GetUp
 from getup_jax.nets.prior_data import pose_conditions
+from getup_jax.paths import asset_path
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
-from getup_jax.tasks.paths import FoundPath, load_path, save_path
+from getup_jax.tasks.paths import SHIPPED, FoundPath, load_path, load_paths, save_path
 from getup_jax.tasks.reset_pool import angle_gap, build_pool, kind_shares
 
 ACTION = LATENT + 49
@@ -150,6 +152,19 @@ def test_a_found_path_reads_as_it_was_written(character, tmp_path):
     for name, value in vars(load_path(file)).items():
         np.testing.assert_array_equal(value, getattr(path, name))
     assert list(path.near(0.5, 0.3)) == [1, 2, 3]
+
+
+def test_the_shipped_paths_are_of_the_shipped_character(character):
+    files = sorted(asset_path("paths").glob("*.npz"))
+    assert len(files) == 20
+    points = getups(character)[0].points
+    styles = [GetUp(file.name.split(".0.npz")[0], 1.0, points) for file in files]
+    for path in load_paths(SHIPPED, styles, character.num_joints, ACTION):
+        assert path is not None
+        assert len(path.time) > 0
+        assert np.isfinite(path.qpos).all()
+        assert np.isfinite(path.action).all()
+        np.testing.assert_allclose(np.linalg.norm(path.qpos[:, 3:7], axis=1), 1.0, atol=1e-4)
 
 
 def test_paths_that_cannot_be_used_say_why(character, engine, tmp_path):

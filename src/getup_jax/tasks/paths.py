@@ -15,7 +15,9 @@ import numpy as np
 
 from getup_jax.config import ConfigError
 from getup_jax.motion.clips import GetUp
+from getup_jax.paths import asset_path
 
+SHIPPED = "authored"  # names the folder of the package, of the authored motions and their prior
 _FIELDS = ("qpos", "qvel", "action", "time", "task_reward", "finished", "seed")
 
 
@@ -74,14 +76,18 @@ def load_path(file: Path) -> FoundPath:
 def load_paths(
     folder: str, getups: Sequence[GetUp], num_joints: int, action_size: int
 ) -> list[FoundPath | None]:
-    """The states of every style, of all its files in one; None for a style that has none."""
-    if not Path(folder).is_dir():
+    """The states of every style, of all its files in one; None for a style that has none.
+
+    folder: of getup-search, or `authored` for those that are shipped.
+    """
+    place = asset_path("paths") if folder == SHIPPED else Path(folder)
+    if not place.is_dir():
         raise ConfigError(
             f"task.paths: no folder {folder}; make it with `getup-search CONFIG --out {folder}`"
         )
     found = []
     for getup in getups:
-        files = sorted(Path(folder).glob(f"{getup.name}.[0-9]*.npz"))
+        files = sorted(place.glob(f"{getup.name}.[0-9]*.npz"))
         paths = [load_path(file) for file in files]
         for file, path in zip(files, paths, strict=True):
             shape = path.qpos.shape[1], path.action.shape[1]
