@@ -107,7 +107,7 @@ class TaskConfig:
     head_clearance_m: float = 0.02  # the head is on the floor below this gap
     stand_start: float = 0.3  # share of episodes that start standing
     clip_start: float = 0.0  # share that starts along the reference clip, or one that fits
-    # folder of getup-search, or `authored`, the shipped one; clip starts are at the states in it
+    # folder of getup-search, or `authored`, the shipped one; clip starts, if any, are at its states
     paths: str | None = None
     path_share: float = 0.6  # share of the clip starts that are, where there are states
     short_share: float = 0.0  # share of the lying and clip starts whose episodes are cut short ...
@@ -125,8 +125,6 @@ class TaskConfig:
         _require(0 <= self.short_share < 1, "task.short_share", "0 to below 1", self.short_share)
         _require(self.short_s > 0, "task.short_s", "more than 0", self.short_s)
         _require(0 <= self.path_share <= 1, "task.path_share", "between 0 and 1", self.path_share)
-        ok = self.paths is None or self.clip_start > 0
-        _require(ok, "task.paths", "null where task.clip_start is 0", self.paths)
         _require(0 < self.filter <= 1, "task.filter", "more than 0 and at most 1", self.filter)
         now = self.lookahead_s[:1] == (0.0,)
         _require(now, "task.lookahead_s", "times that start with 0, the present", self.lookahead_s)
