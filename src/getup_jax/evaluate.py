@@ -31,6 +31,7 @@ from getup_jax.score_table import table
 from getup_jax.scores import Scores, score, to_json
 from getup_jax.storage import from_nested
 from getup_jax.tasks.build import BuiltTask, build_task
+from getup_jax.tasks.draws import whole_episodes
 
 _EPISODES = 100  # by default; on irregular ground in each region
 _DROPS = 1500  # rag-dolls on irregular ground
@@ -102,12 +103,8 @@ def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
         physics = dataclasses.replace(physics, engine=args.engine, solver=solver)
     stand_time_s = task.stand_time_s if args.stand_time is None else args.stand_time
     task = dataclasses.replace(
-        task,
+        whole_episodes(task),
         stand_start=float(args.start == "standing"),
-        clip_start=0.0,
-        paths=None,
-        focus=0.0,
-        short_share=0.0,
         start_noise_rad=args.start_noise,
         terminate_reward=TaskConfig.terminate_reward,
         pool_size=episode_count(config, args),

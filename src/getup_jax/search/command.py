@@ -13,6 +13,7 @@ from getup_jax.progress import Display
 from getup_jax.search.finder import POPULATION, ROUNDS, Finder
 from getup_jax.settings import load_config
 from getup_jax.tasks.build import build_task
+from getup_jax.tasks.draws import whole_episodes
 from getup_jax.tasks.paths import load_path, path_file, save_path
 
 START_NOISE_RAD = 0.05  # joint noise of the lying starts
@@ -76,13 +77,7 @@ def search_config(config: Config, seed: int) -> Config:
     if config.terrain is not None:
         raise ConfigError("terrain: expected null; ways up are searched on flat ground")
     task = dataclasses.replace(
-        config.task,
-        stand_start=0.0,
-        clip_start=0.0,
-        paths=None,
-        focus=0.0,
-        short_share=0.0,
-        start_noise_rad=START_NOISE_RAD,
+        whole_episodes(config.task), stand_start=0.0, start_noise_rad=START_NOISE_RAD
     )
     return dataclasses.replace(config, task=task, seed=seed)
 
@@ -101,7 +96,8 @@ def _searches(finder: Finder, wanted: Sequence[int], args: argparse.Namespace) -
             if path is None:
                 yield f"{getup.name}: no motion to search along"
                 continue
-            save_path(args.out, getup, path)
+            if not file.exists():
+                save_path(args.out, getup, path)
             if path.finished:
                 stands.add(style)
             share = path.time.max(initial=0.0) / getup.duration

@@ -10,13 +10,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.motion import curves
-from getup_jax.motion.clips import Clip
 from getup_jax.motion.events import link_positions
 from getup_jax.search.sampling import Population, Reference, Sampler, Settings, Window
 from getup_jax.tasks.build import BuiltTask
 from getup_jax.tasks.paths import FoundPath
 from getup_jax.tasks.references import Reference as Motion
-from getup_jax.tasks.references import make_references
+from getup_jax.tasks.references import between_frames, make_references
 
 # From the one that most often got far to the one that helps out.
 ROUNDS = (
@@ -85,13 +84,14 @@ class Finder:
         total = duration + env.config.stand_time_s
         count = -(-round(total / dt) // steps) * steps
         time = np.arange(count + 1) * dt
-        angles = jnp.asarray(_angles(motion.clip, time + LEAD_S), jnp.float32)
+        last = len(motion.clip.qpos) - 1
+        wanted = np.minimum((time + LEAD_S) * motion.clip.fps, last)
+        angles = jnp.asarray(between_frames(motion.clip, wanted)[:, 7:], jnp.float32)
         condition = curves.evaluate(
             world.points[style], jnp.asarray(np.minimum(time / duration, 1.0), jnp.float32)
         )
         action = env.action_for(world, angles, condition)
-        frame = np.minimum(time[1:] * motion.clip.fps, len(motion.clip.qpos) - 1).round()
-        frame = frame.astype(int)
+        frame = np.minimum(time[1:] * motion.clip.fps, last).round().astype(int)
         links = link_positions(motion.clip, env.character)[frame]
         trust = np.clip(2.0 - motion.gap[frame], _LEAST_TRUST, 1.0)
         return Reference(action, jnp.asarray(links, jnp.float32), jnp.asarray(trust, jnp.float32))
@@ -151,12 +151,3 @@ def _ancestors(parents: Sequence[np.ndarray]) -> np.ndarray:
     for parent in reversed(parents):
         alive = parent[alive]
     return np.unique(alive)
-
-
-def _angles(clip: Clip, time: np.ndarray) -> np.ndarray:
-    """Hinge angles [N, J] of a motion at times [N] (s), those of its end after it."""
-    place = np.minimum(time * clip.fps, len(clip.qpos) - 1)
-    low = place.astype(int)
-    high = np.minimum(low + 1, len(clip.qpos) - 1)
-    share = (place - low)[:, None]
-    return (1.0 - share) * clip.qpos[low, 7:] + share * clip.qpos[high, 7:]

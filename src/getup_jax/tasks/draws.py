@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import NamedTuple, Protocol
 
 import jax
@@ -21,6 +22,11 @@ class Draw(NamedTuple):
     row: jax.Array  # [B] int32, of the pool
     region: jax.Array | None = None  # [B] int32; None on a flat plane
     lasts: jax.Array | None = None  # [B] s at most, inf: to the end; None: all of them are
+
+
+def whole_episodes(config: TaskConfig) -> TaskConfig:
+    """The settings without what only helps training: no starts on the way, no focus, no cuts."""
+    return dataclasses.replace(config, clip_start=0.0, paths=None, focus=0.0, short_share=0.0)
 
 
 class Starts(Protocol):
