@@ -112,6 +112,8 @@ class TaskConfig:
     path_share: float = 0.6  # share of the clip starts that are, where there are states
     short_share: float = 0.0  # share of the lying and clip starts whose episodes are cut short ...
     short_s: float = 1.5  # ... after this long: more tries of what comes next for the same steps
+    assist: float = 0.0  # share of the weight that a helping hand lifts at most, until starts succeed
+    assist_share: float = 0.5  # share of the lying and clip starts with the hand; needs focus
     curve_match_rad: float = 0.52  # largest gap between a curve's and a pose's torso angles
     focus: float = 0.0  # 0: starts are drawn evenly; towards 1: at the frontier of what is learned
     start_noise_rad: float = 0.0  # joint noise of the start poses
@@ -123,6 +125,11 @@ class TaskConfig:
         _require(0 <= share <= 1, "task.stand_start + task.clip_start", "between 0 and 1", share)
         _require(0 <= self.focus < 1, "task.focus", "at least 0 and less than 1", self.focus)
         _require(0 <= self.short_share < 1, "task.short_share", "0 to below 1", self.short_share)
+        _require(self.assist >= 0, "task.assist", "at least 0", self.assist)
+        ok = self.assist == 0 or self.focus > 0
+        _require(ok, "task.focus", "more than 0 where task.assist is", self.focus)
+        ok = 0 <= self.assist_share < 1
+        _require(ok, "task.assist_share", "at least 0 and less than 1", self.assist_share)
         _require(self.short_s > 0, "task.short_s", "more than 0", self.short_s)
         _require(0 <= self.path_share <= 1, "task.path_share", "between 0 and 1", self.path_share)
         _require(0 < self.filter <= 1, "task.filter", "more than 0 and at most 1", self.filter)

@@ -62,9 +62,16 @@ class Engine(Protocol):
         ...
 
     def step(
-        self, state: PhysicsState, ctrl: jax.Array, balls: PropCommand | None = None
+        self,
+        state: PhysicsState,
+        ctrl: jax.Array,
+        balls: PropCommand | None = None,
+        wrench: jax.Array | None = None,
     ) -> PhysicsState:
-        """One control period with hinge targets ctrl[B, J] (rad), balls put somewhere first."""
+        """One control period with hinge targets ctrl[B, J] (rad), balls put somewhere first.
+
+        wrench [B, 6]: force (N) and torque (Nm), world frame, at the root's centre of mass.
+        """
         ...
 
 

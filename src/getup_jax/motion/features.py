@@ -38,13 +38,19 @@ def features(
     right) and up, angle between the front vector and up (rad, 0 to pi). Supine: the front
     angle is 0; prone: pi; standing: both are pi / 2.
     """
+    height = link_position[..., links.neck, 2] - ground_height
+    angles = _angle_to_up(torso_axes(links, link_position))
+    return jnp.concatenate([height[..., None], angles], axis=-1)
+
+
+def torso_axes(links: FeatureLinks, link_position: jax.Array) -> jax.Array:
+    """Unit side and front vector [..., 2, 3] of the torso in poses [..., L, 3], world frame."""
     neck = link_position[..., links.neck, :]
     right, left = (link_position[..., i, :] for i in (links.right_hip, links.left_hip))
     side = _unit(right - left)
     # [P 3.1]: the cross product of the hips-to-neck and the side vector points forward
     front = _unit(jnp.cross(neck - 0.5 * (left + right), side))
-    height = neck[..., 2] - ground_height
-    return jnp.stack([height, _angle_to_up(side), _angle_to_up(front)], axis=-1)
+    return jnp.stack([side, front], axis=-2)
 
 
 def _unit(v: jax.Array) -> jax.Array:

@@ -51,6 +51,11 @@ class CharacterSpec:
         """J, the number of hinges."""
         return len(self.joint_names)
 
+    @property
+    def weight(self) -> float:
+        """Of all links (N)."""
+        return float(self.model.body_mass.sum() * np.linalg.norm(self.model.opt.gravity))
+
     def link(self, name: str) -> int:
         """Index of a link; an unknown name lists the right ones."""
         return _index(name, self.link_names, "link")

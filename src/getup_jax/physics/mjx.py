@@ -65,13 +65,18 @@ class MjxEngine:
         return _place(self, state)
 
     def step(
-        self, state: PhysicsState, ctrl: jax.Array, balls: PropCommand | None = None
+        self,
+        state: PhysicsState,
+        ctrl: jax.Array,
+        balls: PropCommand | None = None,
+        wrench: jax.Array | None = None,
     ) -> PhysicsState:
         """See `Engine.step`."""
         ctrl = jnp.nan_to_num(ctrl)
         if balls is not None:
             state = state.replace(engine=self._put_balls(state.engine, balls))
-        engine, kinematics = jax.vmap(self._step_one)(state.engine, ctrl)
+        step = jax.vmap(self._step_one, in_axes=(0, 0, None if wrench is None else 0))
+        engine, kinematics = step(state.engine, ctrl, wrench)
         return PhysicsState(engine=engine, kinematics=kinematics)
 
     def _put_balls(self, state: MjxState, balls: PropCommand) -> MjxState:
@@ -89,8 +94,12 @@ class MjxEngine:
             qvel=state.qvel.at[:, size - 1 :].set(qvel.reshape(count[0], -1)),
         )
 
-    def _step_one(self, state: MjxState, ctrl: jax.Array) -> tuple[MjxState, Kinematics]:
+    def _step_one(
+        self, state: MjxState, ctrl: jax.Array, wrench: jax.Array | None
+    ) -> tuple[MjxState, Kinematics]:
         data = self._load(state)
+        if wrench is not None:
+            data = data.replace(xfrc_applied=data.xfrc_applied.at[1].set(jnp.nan_to_num(wrench)))
 
         def substep(data: Any, _: None) -> tuple[Any, None]:
             model, limited = self._limit_servos(data.replace(ctrl=ctrl))

@@ -78,12 +78,18 @@ class NativeEngine:
         return batch.place(qpos, qvel)
 
     def step(
-        self, state: PhysicsState, ctrl: jax.Array, balls: PropCommand | None = None
+        self,
+        state: PhysicsState,
+        ctrl: jax.Array,
+        balls: PropCommand | None = None,
+        wrench: jax.Array | None = None,
     ) -> PhysicsState:
         """See `Engine.step`."""
         batch = self._batch(ctrl.shape[0])
         call = buffer_callback(batch.step, batch.result_shapes, vmap_method=None)
         command = () if balls is None else (balls.mask, balls.position, balls.velocity)
+        if wrench is not None:
+            command += (wrench,)
         rows, kinematics = call(state.engine, ctrl.astype(jnp.float32), *command)
         return PhysicsState(engine=rows, kinematics=Kinematics(**kinematics))
 
@@ -103,7 +109,8 @@ class _HostBatch:
         self._batch = Batch(engine.model, size, min(engine._threads, size), persistent=True)
         self._substeps = engine._substeps
         self._sizes = engine._sizes
-        fields = ("qpos", "qvel", "ctrl", "xpos", "xquat", "cvel", "subtree_com", "actuator_force")
+        state, derived = ("qpos", "qvel", "ctrl", "xfrc_applied"), ("xpos", "xquat", "cvel")
+        fields = (*state, *derived, "subtree_com", "actuator_force")
         self._views = {name: self._batch.bind(name) for name in fields}
         shapes = self._sizes.shapes()
         kinematics = {k: jax.ShapeDtypeStruct((size, *s), np.float32) for k, s in shapes.items()}
@@ -111,17 +118,25 @@ class _HostBatch:
         rows = jax.ShapeDtypeStruct((size, 2 * self._batch.nstate), np.uint32)
         self.result_shapes = (rows, kinematics)
 
-    def step(self, _: Any, out: Any, rows: Any, ctrl: Any, *balls: Any) -> None:
-        """One control period, from rows, ctrl and a command of balls into the output buffers."""
+    def step(self, _: Any, out: Any, rows: Any, ctrl: Any, *more: Any) -> None:
+        """One control period, from rows and ctrl into the output buffers.
+
+        more: the three parts of a command of balls, if any, then the wrench, if any.
+        """
         self._batch.state[...] = np.asarray(rows).view(np.float64)
+        balls, wrench = more[: len(more) // 3 * 3], more[len(more) // 3 * 3 :]
         if balls:
             self._put_balls(*(np.asarray(part) for part in balls))
+        for force in wrench:
+            self._views["xfrc_applied"][:, 1] = np.nan_to_num(np.asarray(force))
         self._views["ctrl"][...] = np.nan_to_num(np.asarray(ctrl))
         failed = np.zeros(self._batch.nsim, bool)
         try:
             self._batch.step(nstep=self._substeps, stage=_STAGE)
         except SimulationError as error:
             failed[error.ids] = True
+        if wrench:
+            self._views["xfrc_applied"][:, 1] = 0.0  # the next step may have none
         out_rows, out_kinematics = out
         np.asarray(out_rows)[...] = self._batch.state.view(np.uint32)
         self._write(failed, {name: np.asarray(buffer) for name, buffer in out_kinematics.items()})

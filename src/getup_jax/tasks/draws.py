@@ -22,11 +22,14 @@ class Draw(NamedTuple):
     row: jax.Array  # [B] int32, of the pool
     region: jax.Array | None = None  # [B] int32; None on a flat plane
     lasts: jax.Array | None = None  # [B] s at most, inf: to the end; None: all of them are
+    helped: jax.Array | None = None  # [B] bool, with the helping hand; None: there is none
 
 
 def whole_episodes(config: TaskConfig) -> TaskConfig:
-    """The settings without what only helps training: no starts on the way, no focus, no cuts."""
-    return dataclasses.replace(config, clip_start=0.0, paths=None, focus=0.0, short_share=0.0)
+    """The settings without what only helps training: no starts on the way, focus, cuts, hand."""
+    return dataclasses.replace(
+        config, clip_start=0.0, paths=None, focus=0.0, short_share=0.0, assist=0.0
+    )
 
 
 class Starts(Protocol):
@@ -59,10 +62,14 @@ def draw_starts(
         chance = jax.random.uniform(jax.random.fold_in(key, 1), (num_envs,))
         short = (chance < config.short_share) & (kind != STANDING)
         lasts = jnp.where(short, config.short_s, jnp.inf)
+    helped = None
+    if config.assist > 0:
+        chance = jax.random.uniform(jax.random.fold_in(key, 2), (num_envs,))
+        helped = (chance < config.assist_share) & (kind != STANDING)
     if learned is not None:
         weight = focus.weights(learned, world.pool, world.duration, config.focus)
         getup, row = focus.draw(weight, focus.place_of(world.pool, kind, region), key_row)
-        return Draw(getup, kind, row, region, lasts)
+        return Draw(getup, kind, row, region, lasts, helped)
     *_, num_styles, rows = world.pool.table.shape
     startable = world.pool.startable
     if region is None or startable is None:

@@ -55,6 +55,9 @@ class EpisodeState:
     until: jax.Array | None = None
     # [3 R, G, bins] success of the batch's starts; see focus.py
     focus: jax.Array | None = None
+    # [B] N, most lift of the helping hand; [3 R, G, bins] its levels; None: there is no hand
+    lift: jax.Array | None = None
+    assist: jax.Array | None = None
     # Irregular ground only; None on a flat plane.
     region: jax.Array | None = None  # [B] int32, where the episode started
     curriculum: Curriculum | None = None  # of the whole batch

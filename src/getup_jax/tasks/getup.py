@@ -16,7 +16,7 @@ from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain import Ground
 from getup_jax.rotation import angle, conjugate, multiply, rotate
 from getup_jax.rows import replace_rows
-from getup_jax.tasks import curriculum, focus, rewards
+from getup_jax.tasks import assist, curriculum, focus, rewards
 from getup_jax.tasks.draws import Draw, draw_starts
 from getup_jax.tasks.episode import (
     EpisodeState,
@@ -76,9 +76,11 @@ class GetUpTask:
         """B fresh episodes."""
         key_start, key_state = jax.random.split(key)
         learned = focus.first(world.pool) if self.config.focus > 0 else None
+        levels = jnp.ones_like(learned) if self.config.assist > 0 else None
         progress = None if self.terrain is None else curriculum.first(self.terrain)
-        state = self.start_random(world, key_start, num_envs, learned, progress)
-        return state.replace(key=key_state, focus=learned, curriculum=progress)
+        drawn = draw_starts(self.config, world, key_start, num_envs, learned, progress)
+        state = self._begin(world, drawn, levels)
+        return state.replace(key=key_state, focus=learned, assist=levels, curriculum=progress)
 
     def step(
         self, world: World, state: EpisodeState, action: jax.Array
@@ -86,38 +88,36 @@ class GetUpTask:
         """One control step; episodes that end start anew."""
         after, output = self.advance(world, state, action)
         key_next, key_reset = jax.random.split(state.key)
-        learned = self._learned(world, after, output)
+        learned, levels = self._learned(world, after, output)
         progress, output = self._progress(after, output)
         drawn = draw_starts(self.config, world, key_reset, action.shape[0], learned, progress)
 
         def fresh(index: jax.Array) -> EpisodeState:
-            return self._begin(world, jax.tree.map(lambda x: x[index], drawn)).replace(key=None)
+            picked = jax.tree.map(lambda x: x[index], drawn)
+            return self._begin(world, picked, levels).replace(key=None)
 
         done = output.terminated | output.truncated
         # what belongs to the whole batch has no simulation axis and stays out of the rows
-        rows = after.replace(key=None, focus=None, curriculum=None)
+        rows = after.replace(key=None, focus=None, assist=None, curriculum=None)
         after = replace_rows(rows, done, fresh, _RESET_CHUNK)
-        after = after.replace(key=key_next, focus=learned, curriculum=progress)
+        after = after.replace(key=key_next, focus=learned, assist=levels, curriculum=progress)
         return after, output.replace(observation=after.observation)
 
-    def start_random(
-        self,
-        world: World,
-        key: jax.Array,
-        num_envs: int,
-        learned: jax.Array | None = None,
-        progress: curriculum.Curriculum | None = None,
-    ) -> EpisodeState:
-        """Episodes with a random style and kind of start, in the regions that are open.
-
-        learned and progress are the state's focus and curriculum.
-        """
-        drawn = draw_starts(self.config, world, key, num_envs, learned, progress)
-        return self._begin(world, drawn)
-
-    def _begin(self, world: World, drawn: Draw) -> EpisodeState:
+    def _begin(self, world: World, drawn: Draw, levels: jax.Array | None) -> EpisodeState:
         state = self.start(world, drawn.getup, drawn.kind, drawn.row, region=drawn.region)
-        return state if drawn.lasts is None else state.replace(until=state.time + drawn.lasts)
+        if drawn.lasts is not None:
+            state = state.replace(until=state.time + drawn.lasts)
+        if drawn.helped is None or levels is None:
+            return state
+        most = self.config.assist * self.character.weight * levels[self._cell(world, state)]
+        return state.replace(lift=jnp.where(drawn.helped, most, 0.0))
+
+    def _cell(self, world: World, state: EpisodeState) -> tuple[jax.Array, ...]:
+        """Indices [B] of the cells of `focus.py` in which the episodes started."""
+        steps = state.record.rise_steps + state.record.stand_steps
+        begin = (state.time - steps * self.engine.control_dt) / state.duration
+        place = focus.place_of(world.pool, state.kind, state.region)
+        return place, state.getup, focus.bin_of(begin)
 
     def _progress(
         self, state: EpisodeState, output: StepOutput
@@ -130,19 +130,29 @@ class GetUpTask:
         opened = jnp.full(len(success), progress.opened, jnp.float32)
         return progress, output.replace(metrics=output.metrics | {"regions_open": opened})
 
-    def _learned(self, world: World, state: EpisodeState, output: StepOutput) -> jax.Array | None:
-        """The focus after the episodes that end with this step."""
+    def _learned(
+        self, world: World, state: EpisodeState, output: StepOutput
+    ) -> tuple[jax.Array | None, jax.Array | None]:
+        """The focus and the hand's levels after the episodes that end with this step."""
         if state.focus is None:
-            return None
-        steps = state.record.rise_steps + state.record.stand_steps
-        begin = (state.time - steps * self.engine.control_dt) / state.duration
-        place = focus.place_of(world.pool, state.kind, state.region)
-        cell = (place, state.getup, focus.bin_of(begin))
+            return None, None
+        cell = self._cell(world, state)
         success = output.truncated & stands(state.record)
-        ended = output.terminated | output.truncated
-        if state.until is not None:
-            ended &= jnp.isinf(state.until)  # a short one says nothing about success
-        return focus.update(state.focus, cell, ended, success)
+        ended = (output.terminated | output.truncated) & self._counts(state)
+        learned = focus.update(state.focus, cell, ended & self._alone(state), success)
+        if state.assist is None:
+            return learned, None
+        return learned, assist.update(state.assist, cell, ended & ~self._alone(state), success)
+
+    def _counts(self, state: EpisodeState) -> jax.Array:
+        """Which episodes [B] can end standing; one that is cut short says nothing about success."""
+        full = jnp.ones(len(state.time), bool)
+        return full if state.until is None else jnp.isinf(state.until)
+
+    def _alone(self, state: EpisodeState) -> jax.Array:
+        """Which episodes [B] have no helping hand."""
+        alone = jnp.ones(len(state.time), bool)
+        return alone if state.lift is None else state.lift == 0.0
 
     def start(
         self,
@@ -188,7 +198,8 @@ class GetUpTask:
     ) -> tuple[EpisodeState, StepOutput]:
         """One control step without resets; `observation` is the final one."""
         filtered = self.config.filter * action + (1.0 - self.config.filter) * state.action
-        physics = self.engine.step(state.physics, self.servo_target(world, state, filtered))
+        target = self.servo_target(world, state, filtered)
+        physics = self.engine.step(state.physics, target, wrench=self._hand(world, state))
         state = state.replace(
             physics=physics, action=filtered, time=state.time + self.engine.control_dt
         )
@@ -222,12 +233,21 @@ class GetUpTask:
 
     def _verdict(self, state: EpisodeState, truncated: jax.Array) -> dict[str, jax.Array]:
         episode = verdict(state, truncated, self._full_steps(state))
-        if state.until is not None:
-            full = jnp.isinf(state.until)
-            episode = {name: jnp.where(full, x, jnp.nan) for name, x in episode.items()}
+        if state.until is not None or state.lift is not None:
+            whole = self._counts(state) & self._alone(state)
+            episode = {name: jnp.where(whole, x, jnp.nan) for name, x in episode.items()}
         if state.region is None:
             return episode
         return episode | curriculum.by_region(episode, state.region)
+
+    def _hand(self, world: World, state: EpisodeState) -> jax.Array | None:
+        """Wrench [B, 6] of the helping hand; None: there is none."""
+        if state.lift is None:
+            return None
+        measured = state.observation[:, self.observer.slices()["features"]]
+        target = self.targets(world, state)[:, 0]
+        kinematics = state.physics.kinematics
+        return assist.wrench(self.observer.links, kinematics, measured, target, state.lift)
 
     def servo_target(self, world: World, state: EpisodeState, filtered: jax.Array) -> jax.Array:
         """Hinge targets [B, J]: q = decoder(z, c) + dq [P 3.4], c the curve values now."""

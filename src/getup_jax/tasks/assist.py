@@ -1,0 +1,63 @@
+"""A helping hand on the pelvis while training, which lets go where starts succeed with it.
+
+It lifts like a rope while the neck is below the curve, and turns the pelvis towards the curve's
+torso angles, so that it needs no more than the curve. What it may give at most is a share of the
+full hand, its level; every cell of `focus.py` has its own. A level falls with each success of an
+episode that started there with the hand, and rises with each failure, so that a third of them
+succeed until the hand is gone (compare Yu et al. 2018, Learning symmetric and low-energy
+locomotion). Evaluation has no hand.
+"""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+
+from getup_jax.motion.features import FeatureLinks, torso_axes
+from getup_jax.types import Kinematics
+
+FALL, RISE = 0.02, 0.01  # change of a level at a success and at a failure
+_FULL_AT_M = 0.15  # below the curve, where the lift is at its most
+_FULL_AT_RAD = 0.5  # off the curve's angles, where the turn is at its most
+_TURN_NM_PER_N = 0.25  # m, the most turn for the most lift
+_DAMPING_S = 0.05  # rad of error that an angular velocity of 1 rad/s counts as
+
+
+def wrench(
+    links: FeatureLinks,
+    kinematics: Kinematics,
+    features: jax.Array,
+    target: jax.Array,
+    most: jax.Array,
+) -> jax.Array:
+    """Force (N) and torque (Nm) [B, 6] on the root, world frame.
+
+    features and target [B, 3]: measured, and on the curve; most [B]: the most lift (N).
+
+        f_z = most clip((p_h - h) / .15, 0, 1)
+        m = .25 most clip_norm((sum_i (theta_i - p_i) n_i - .05 w) / .5, 1)
+
+    n_i = (a_i x z) / |a_i x z| turns the torso's side or front vector a_i up, which makes its angle
+    theta_i smaller; w is the root's angular velocity (rad/s).
+    """
+    error = features - target
+    lift = most * jnp.clip(-error[:, 0] / _FULL_AT_M, 0.0, 1.0)
+    axes = torso_axes(links, kinematics.link_position)  # [B, 2, 3]
+    up = jnp.asarray([0.0, 0.0, 1.0])
+    turn_axis = jnp.cross(axes, up)
+    length = jnp.linalg.norm(turn_axis, axis=-1, keepdims=True)
+    turn_axis = turn_axis / jnp.maximum(length, 0.1)  # fades where every way is up
+    spin = kinematics.link_angular_velocity[:, links.root]
+    turn = jnp.sum(error[:, 1:, None] * turn_axis, axis=1) - _DAMPING_S * spin
+    share = turn / _FULL_AT_RAD
+    share = share / jnp.maximum(jnp.linalg.norm(share, axis=-1, keepdims=True), 1.0)
+    torque = _TURN_NM_PER_N * most[:, None] * share
+    return jnp.concatenate([lift[:, None] * up, torque], axis=-1)
+
+
+def update(
+    level: jax.Array, cell: tuple[jax.Array, ...], ended: jax.Array, success: jax.Array
+) -> jax.Array:
+    """The levels after episodes [B] with the hand that ended; cell holds their indices [B]."""
+    change = jnp.where(success, -FALL, RISE) * ended
+    return jnp.clip(level.at[cell].add(change), 0.0, 1.0)
