@@ -112,7 +112,9 @@ class TaskConfig:
     path_share: float = 0.6  # share of the clip starts that are, where there are states
     short_share: float = 0.0  # share of the lying and clip starts whose episodes are cut short ...
     short_s: float = 1.5  # ... after this long: more tries of what comes next for the same steps
-    assist: float = 0.0  # share of the weight that a helping hand lifts at most, until starts succeed
+    assist: float = (
+        0.0  # share of the weight that a helping hand lifts at most, until starts succeed
+    )
     assist_share: float = 0.5  # share of the lying and clip starts with the hand; needs focus
     curve_match_rad: float = 0.52  # largest gap between a curve's and a pose's torso angles
     focus: float = 0.0  # 0: starts are drawn evenly; towards 1: at the frontier of what is learned

@@ -315,7 +315,7 @@ def test_the_same_key_gives_the_same_run(jitted):
 
 def test_resets_draw_the_kinds_in_their_shares_and_all_styles(jitted):
     count = 4000
-    start = jax.jit(jitted.task.start_random, static_argnums=2)
+    start = jax.jit(jitted.task.init, static_argnums=2)
     state = start(jitted.world, jax.random.PRNGKey(0), count)
     shares = np.bincount(np.asarray(state.kind), minlength=3) / count
     # standard errors are below 0.008
@@ -332,5 +332,5 @@ def test_resets_draw_the_kinds_in_their_shares_and_all_styles(jitted):
 def test_a_share_of_zero_draws_nothing(jitted):
     config = dataclasses.replace(jitted.task.config, stand_start=0.0, clip_start=0.0)
     task = dataclasses.replace(jitted.task, config=config)
-    state = jax.jit(task.start_random, static_argnums=2)(jitted.world, jax.random.PRNGKey(0), 500)
+    state = jax.jit(task.init, static_argnums=2)(jitted.world, jax.random.PRNGKey(0), 500)
     np.testing.assert_array_equal(state.kind, LYING)

@@ -55,16 +55,16 @@ def draw_starts(
     progress: curriculum.Curriculum | None,
 ) -> Draw:
     """Starts of B = num_envs episodes; learned is the focus of `focus.py`, None: even draws."""
-    key_kind, key_style, key_row = jax.random.split(key, 3)
-    kind, region = _places(config, key, key_kind, num_envs, progress)
+    key_place, key_style, key_row, key_short, key_help = jax.random.split(key, 5)
+    kind, region = _places(config, key_place, num_envs, progress)
     lasts = None
     if config.short_share > 0:
-        chance = jax.random.uniform(jax.random.fold_in(key, 1), (num_envs,))
+        chance = jax.random.uniform(key_short, (num_envs,))
         short = (chance < config.short_share) & (kind != STANDING)
         lasts = jnp.where(short, config.short_s, jnp.inf)
     helped = None
     if config.assist > 0:
-        chance = jax.random.uniform(jax.random.fold_in(key, 2), (num_envs,))
+        chance = jax.random.uniform(key_help, (num_envs,))
         helped = (chance < config.assist_share) & (kind != STANDING)
     if learned is not None:
         weight = focus.weights(learned, world.pool, world.duration, config.focus)
@@ -84,17 +84,17 @@ def draw_starts(
 def _places(
     config: TaskConfig,
     key: jax.Array,
-    key_kind: jax.Array,
     num_envs: int,
     progress: curriculum.Curriculum | None,
 ) -> tuple[jax.Array, jax.Array | None]:
     """Kinds of start [B] and regions [B], None on a flat plane."""
+    key_kind, key_region = jax.random.split(key)
     draw = jax.random.uniform(key_kind, (num_envs,))
     stand, clip = config.stand_start, config.clip_start
     kind = jnp.where(draw < stand, STANDING, jnp.where(draw < stand + clip, CLIP, LYING))
     kind = kind.astype(jnp.int32)
     if progress is None:
         return kind, None
-    region = curriculum.draw_region(progress, jax.random.fold_in(key, 0), num_envs)
+    region = curriculum.draw_region(progress, key_region, num_envs)
     # only the flat region has starts along a clip
     return jnp.where((region > 0) & (kind == CLIP), LYING, kind), region

@@ -1,0 +1,176 @@
+"""The helping hand: its wrench, its levels, and that its episodes do not count as success."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from tiny_task import CONFIG, tiny_task
+
+from getup_jax.config import ConfigError, TaskConfig
+from getup_jax.motion.features import FeatureLinks, features
+from getup_jax.tasks import assist, focus
+from getup_jax.tasks.draws import draw_starts, whole_episodes
+from getup_jax.tasks.episode import CLIP, STANDING
+from getup_jax.types import Kinematics
+
+MOST = 300.0  # N
+
+
+def at(character, rotation: Rotation, spin=(0.0, 0.0, 0.0)) -> tuple[Kinematics, jax.Array]:
+    """The neutral pose turned about its root [1, ...], and its features."""
+    data = mujoco.MjData(character.model)
+    data.qpos[:] = character.neutral_qpos
+    data.qpos[3:7] = rotation.as_quat(scalar_first=True)
+    mujoco.mj_kinematics(character.model, data)
+    links = len(character.link_names)
+    position = jnp.asarray(data.xpos[None, 1 : 1 + links], jnp.float32)
+    angular = jnp.zeros((1, links, 3)).at[:, 0].set(jnp.asarray(spin))
+    kinematics = Kinematics(
+        qpos=None, qvel=None, link_position=position, link_quaternion=None,
+        link_angular_velocity=angular, link_linear_velocity=None, torque=None, finite=None,
+    )  # fmt: skip
+    return kinematics, features(FeatureLinks.of(character), position, 0.0)
+
+
+def hand(character, rotation, change, spin=(0.0, 0.0, 0.0)) -> np.ndarray:
+    """The wrench [6] where the target is the pose's features plus change [3]."""
+    kinematics, value = at(character, rotation, spin)
+    target = value + jnp.asarray(change)
+    links = FeatureLinks.of(character)
+    return np.asarray(assist.wrench(links, kinematics, value, target, jnp.asarray([MOST])))[0]
+
+
+def test_it_lifts_below_the_curve_and_never_pushes_down(character):
+    upright = Rotation.identity()
+    np.testing.assert_allclose(
+        hand(character, upright, [0.075, 0, 0]), [0, 0, 150, 0, 0, 0], rtol=1e-5
+    )
+    np.testing.assert_allclose(hand(character, upright, [0.5, 0, 0]), [0, 0, MOST, 0, 0, 0])
+    np.testing.assert_allclose(hand(character, upright, [-0.5, 0, 0]), 0.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_its_torque_turns_the_torso_towards_the_curves_angles(character, seed):
+    rng = np.random.default_rng(seed)
+    rotation = Rotation.from_rotvec(rng.uniform(-1.0, 1.0, 3))
+    change = np.array([0.0, *rng.uniform(-0.3, 0.3, 2)])
+    torque = hand(character, rotation, change)[3:]
+    turned = Rotation.from_rotvec(1e-3 * torque / np.linalg.norm(torque)) * rotation
+    before, after = at(character, rotation)[1][0], at(character, turned)[1][0]
+    goal = before + change
+    assert np.abs(after - goal)[1:].sum() < np.abs(before - goal)[1:].sum() - 1e-4
+
+
+def test_its_torque_is_limited_and_brakes(character):
+    torque = hand(character, Rotation.identity(), [0.0, 0.9, 0.9])[3:]
+    assert np.linalg.norm(torque) == pytest.approx(0.25 * MOST)
+    # .05 rad of error for 1 rad/s, where .5 rad are worth .25 m times the most lift
+    brake = hand(character, Rotation.identity(), [0.0, 0.0, 0.0], spin=(0.0, 0.0, 2.0))[3:]
+    np.testing.assert_allclose(brake, [0.0, 0.0, -0.25 * MOST * 0.05 * 2.0 / 0.5], rtol=1e-5)
+
+
+def test_levels_fall_with_success_rise_with_failure_and_stay_in_range():
+    level = jnp.asarray([1.0, 0.5, 0.5, 0.01])
+    cell = (jnp.asarray([0, 1, 1, 2, 3]),)
+    ended = jnp.asarray([True, True, True, False, True])
+    success = jnp.asarray([False, True, True, True, True])
+    after = np.asarray(assist.update(level, cell, ended, success))
+    np.testing.assert_allclose(after, [1.0, 0.5 - 2 * assist.FALL, 0.5, 0.0], atol=1e-6)
+
+
+def test_the_engine_carries_the_weight_for_one_step_only(character, engine):
+    flying = np.tile(character.neutral_qpos, (2, 1))
+    flying[:, 2] = 3.0
+    state = engine.place(flying, np.zeros((2, character.model.nv)))
+    ctrl = jnp.asarray(flying[:, 7:], jnp.float32)
+    lift = jnp.zeros((2, 6)).at[0, 2].set(character.weight)
+    lifted = engine.step(state, ctrl, wrench=lift)
+    mass = character.model.body_mass[1:]
+
+    def fall(after) -> np.ndarray:
+        # of the centre of mass: a force on the root moves it as it would a point
+        data, speed = mujoco.MjData(character.model), []
+        for qpos, qvel in zip(after.kinematics.qpos, after.kinematics.qvel, strict=True):
+            data.qpos[:], data.qvel[:] = qpos, qvel
+            mujoco.mj_forward(character.model, data)
+            mujoco.mj_subtreeVel(character.model, data)
+            speed.append(data.subtree_linvel[1, 2])
+        return np.array(speed)
+
+    period = engine.control_dt
+    np.testing.assert_allclose(fall(lifted), [0.0, -9.81 * period], atol=0.01)
+    next_one = engine.step(lifted, ctrl)
+    np.testing.assert_allclose(fall(next_one), [-9.81 * period, -9.81 * 2 * period], atol=0.01)
+    assert character.weight == pytest.approx(9.81 * mass.sum())
+
+
+@pytest.fixture(scope="module")
+def helped(character):
+    task = dataclasses.replace(CONFIG.task, focus=0.9, assist=0.5)
+    return tiny_task(character, dataclasses.replace(CONFIG, task=task))
+
+
+def test_half_of_the_starts_get_the_hand_and_standing_ones_never(helped, character):
+    env = helped.environment
+    state = env.init(helped.world, jax.random.PRNGKey(0), 512)
+    assert state.assist.shape == state.focus.shape
+    lift, standing = np.asarray(state.lift), np.asarray(state.kind) == STANDING
+    assert set(np.unique(lift).round(3)) == {0.0, np.float32(0.5 * character.weight).round(3)}
+    assert (lift[standing] == 0).all()
+    assert abs((lift[~standing] > 0).mean() - 0.5) < 0.1
+
+
+def test_success_with_the_hand_lowers_its_level_and_is_not_counted(helped):
+    env, world = helped.environment, helped.world
+    state = env.init(world, jax.random.PRNGKey(0), 8)
+    count = len(state.time)
+    # all stand at the end of an episode that began on the way, half of them with the hand
+    standing = env.start(world, state.getup, jnp.full(count, STANDING), jnp.zeros(count, jnp.int32))
+    lift = jnp.where(jnp.arange(count) % 2 == 0, 100.0, 0.0)
+    state = standing.replace(
+        key=state.key, focus=state.focus + 0.5, assist=state.assist * 0.5, lift=lift,
+        kind=jnp.full(count, CLIP), time=standing.duration + env.config.stand_time_s,
+    )  # fmt: skip
+    after, output = jax.jit(env.step)(world, state, state.action)
+    assert bool(output.truncated.all())
+    np.testing.assert_array_equal(np.isnan(output.episode["clip_success"]), lift > 0)
+    focused, levels = np.asarray(after.focus), np.asarray(after.assist)
+    alone, with_hand = (np.asarray(state.getup)[np.asarray(lift) == x] for x in (0.0, 100.0))
+    for style in range(focused.shape[1]):
+        rises = focused[CLIP, style] > 0.5
+        assert rises.sum() == (style in alone)
+        lowered = levels[CLIP, style] < 0.5
+        assert lowered.sum() == (style in with_hand)
+    assert (np.asarray(after.focus)[:CLIP] == 0.5).all()
+
+
+def test_evaluation_has_no_hand(helped):
+    assert whole_episodes(helped.environment.config).assist == 0.0
+
+
+def test_the_hand_needs_the_focus_whose_cells_it_has():
+    with pytest.raises(ConfigError, match=r"task\.focus: .*task\.assist"):
+        TaskConfig(assist=0.5)
+
+
+def test_what_an_episode_starts_from_is_drawn_independently(helped):
+    # one key used twice would give the hand, or the short episodes, to some of the styles only
+    task = dataclasses.replace(helped.environment.config, short_share=0.5)
+    learned = focus.first(helped.world.pool)
+    drawn = draw_starts(task, helped.world, jax.random.PRNGKey(1), 8000, learned, None)
+    lying = np.asarray(drawn.kind) != STANDING
+    parts = {
+        "style": np.asarray(drawn.getup)[lying],
+        "row": np.asarray(drawn.row)[lying],
+        "kind": np.asarray(drawn.kind)[lying],
+        "short": np.isfinite(np.asarray(drawn.lasts))[lying],
+        "hand": np.asarray(drawn.helped)[lying],
+    }
+    for name in ("short", "hand"):
+        for other in {"style", "row", "kind", "short", "hand"} - {name}:
+            # its standard error is .01
+            assert abs(np.corrcoef(parts[other], parts[name])[0, 1]) < 0.05, (name, other)
