@@ -14,7 +14,7 @@ from getup_jax.config import ConfigError, TaskConfig
 from getup_jax.motion.features import FeatureLinks, features
 from getup_jax.tasks import assist, focus
 from getup_jax.tasks.draws import draw_starts, whole_episodes
-from getup_jax.tasks.episode import CLIP, STANDING
+from getup_jax.tasks.episode import CLIP, LYING, STANDING
 from getup_jax.types import Kinematics
 
 MOST = 300.0  # N
@@ -114,20 +114,25 @@ def helped(character):
     return tiny_task(character, dataclasses.replace(CONFIG, task=task))
 
 
-def test_half_of_the_starts_get_the_hand_and_standing_ones_never(helped, character):
-    env = helped.environment
-    state = env.init(helped.world, jax.random.PRNGKey(0), 512)
+@pytest.fixture(scope="module")
+def first(helped):
+    """128 fresh episodes."""
+    init = jax.jit(helped.environment.init, static_argnums=2)
+    return init(helped.world, jax.random.PRNGKey(0), 128)
+
+
+def test_half_of_the_starts_get_the_hand_and_standing_ones_never(first, character):
+    state = first
     assert state.assist.shape == state.focus.shape
     lift, standing = np.asarray(state.lift), np.asarray(state.kind) == STANDING
     assert set(np.unique(lift).round(3)) == {0.0, np.float32(0.5 * character.weight).round(3)}
     assert (lift[standing] == 0).all()
-    assert abs((lift[~standing] > 0).mean() - 0.5) < 0.1
+    assert abs((lift[~standing] > 0).mean() - 0.5) < 0.2
 
 
-def test_success_with_the_hand_lowers_its_level_and_is_not_counted(helped):
-    env, world = helped.environment, helped.world
-    state = env.init(world, jax.random.PRNGKey(0), 8)
-    count = len(state.time)
+def test_success_with_the_hand_lowers_its_level_and_is_not_counted(helped, first):
+    env, world, count = helped.environment, helped.world, 8
+    state = first.replace(getup=first.getup[:count])
     # all stand at the end of an episode that began on the way, half of them with the hand
     standing = env.start(world, state.getup, jnp.full(count, STANDING), jnp.zeros(count, jnp.int32))
     lift = jnp.where(jnp.arange(count) % 2 == 0, 100.0, 0.0)
@@ -174,3 +179,15 @@ def test_what_an_episode_starts_from_is_drawn_independently(helped):
         for other in {"style", "row", "kind", "short", "hand"} - {name}:
             # its standard error is .01
             assert abs(np.corrcoef(parts[other], parts[name])[0, 1]) < 0.05, (name, other)
+
+
+def test_starts_with_the_hand_have_a_frontier_of_their_own(helped):
+    task = dataclasses.replace(helped.environment.config, focus=0.999)
+    # alone the first style rises from lying, with the hand the second one does
+    learned = focus.first(helped.world.pool).at[CLIP].set(1.0).at[LYING, 0].set(1.0)
+    levels = jnp.ones_like(learned).at[CLIP].set(0.0).at[LYING, 1].set(0.0)
+    drawn = draw_starts(task, helped.world, jax.random.PRNGKey(2), 4000, learned, None, levels)
+    lying, hand = np.asarray(drawn.kind) == LYING, np.asarray(drawn.helped)
+    style = np.asarray(drawn.getup)
+    assert (style[lying & ~hand] == 1).mean() > 0.99
+    assert (style[lying & hand] == 0).mean() > 0.99

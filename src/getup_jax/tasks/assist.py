@@ -5,7 +5,8 @@ torso angles, so that it needs no more than the curve. What it may give at most 
 full hand, its level; every cell of `focus.py` has its own. A level falls with each success of an
 episode that started there with the hand, and rises with each failure, so that a third of them
 succeed until the hand is gone (compare Yu et al. 2018, Learning symmetric and low-energy
-locomotion). Evaluation has no hand.
+locomotion). Starts with the hand are drawn at a frontier of their own, that of 1 - level: with it
+a whole rise is learned before its parts are without. Evaluation has no hand.
 """
 
 from __future__ import annotations

@@ -53,8 +53,12 @@ def draw_starts(
     num_envs: int,
     learned: jax.Array | None,
     progress: curriculum.Curriculum | None,
+    levels: jax.Array | None = None,
 ) -> Draw:
-    """Starts of B = num_envs episodes; learned is the focus of `focus.py`, None: even draws."""
+    """Starts of B = num_envs episodes; learned is the focus of `focus.py`, None: even draws.
+
+    levels are those of `assist.py`: starts with the hand are drawn where it is about to let go.
+    """
     key_place, key_style, key_row, key_short, key_help = jax.random.split(key, 5)
     kind, region = _places(config, key_place, num_envs, progress)
     lasts = None
@@ -67,8 +71,17 @@ def draw_starts(
         chance = jax.random.uniform(key_help, (num_envs,))
         helped = (chance < config.assist_share) & (kind != STANDING)
     if learned is not None:
-        weight = focus.weights(learned, world.pool, world.duration, config.focus)
-        getup, row = focus.draw(weight, focus.place_of(world.pool, kind, region), key_row)
+        place = focus.place_of(world.pool, kind, region)
+
+        def frontier(learned: jax.Array) -> tuple[jax.Array, jax.Array]:
+            weight = focus.weights(learned, world.pool, world.duration, config.focus)
+            return focus.draw(weight, place, key_row)
+
+        getup, row = frontier(learned)
+        if helped is not None and levels is not None:
+            of_the_hand = frontier(1.0 - levels)
+            getup = jnp.where(helped, of_the_hand[0], getup)
+            row = jnp.where(helped, of_the_hand[1], row)
         return Draw(getup, kind, row, region, lasts, helped)
     *_, num_styles, rows = world.pool.table.shape
     startable = world.pool.startable

@@ -16,12 +16,11 @@ from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain import Ground
 from getup_jax.rotation import angle, conjugate, multiply, rotate
 from getup_jax.rows import replace_rows
-from getup_jax.tasks import assist, curriculum, focus, rewards
+from getup_jax.tasks import assist, curriculum, focus, practice, rewards
 from getup_jax.tasks.draws import Draw, draw_starts
 from getup_jax.tasks.episode import (
     EpisodeState,
     Record,
-    stands,
     update_record,
     verdict,
 )
@@ -78,7 +77,7 @@ class GetUpTask:
         learned = focus.first(world.pool) if self.config.focus > 0 else None
         levels = jnp.ones_like(learned) if self.config.assist > 0 else None
         progress = None if self.terrain is None else curriculum.first(self.terrain)
-        drawn = draw_starts(self.config, world, key_start, num_envs, learned, progress)
+        drawn = draw_starts(self.config, world, key_start, num_envs, learned, progress, levels)
         state = self._begin(world, drawn, levels)
         return state.replace(key=key_state, focus=learned, assist=levels, curriculum=progress)
 
@@ -88,9 +87,10 @@ class GetUpTask:
         """One control step; episodes that end start anew."""
         after, output = self.advance(world, state, action)
         key_next, key_reset = jax.random.split(state.key)
-        learned, levels = self._learned(world, after, output)
-        progress, output = self._progress(after, output)
-        drawn = draw_starts(self.config, world, key_reset, action.shape[0], learned, progress)
+        learned, levels = practice.learned(world.pool, after, output, self.engine.control_dt)
+        progress, output = practice.progress(self.terrain, after, output)
+        size = action.shape[0]
+        drawn = draw_starts(self.config, world, key_reset, size, learned, progress, levels)
 
         def fresh(index: jax.Array) -> EpisodeState:
             picked = jax.tree.map(lambda x: x[index], drawn)
@@ -109,50 +109,9 @@ class GetUpTask:
             state = state.replace(until=state.time + drawn.lasts)
         if drawn.helped is None or levels is None:
             return state
-        most = self.config.assist * self.character.weight * levels[self._cell(world, state)]
+        cell = practice.first_cell(world.pool, state, self.engine.control_dt)
+        most = self.config.assist * self.character.weight * levels[cell]
         return state.replace(lift=jnp.where(drawn.helped, most, 0.0))
-
-    def _cell(self, world: World, state: EpisodeState) -> tuple[jax.Array, ...]:
-        """Indices [B] of the cells of `focus.py` in which the episodes started."""
-        steps = state.record.rise_steps + state.record.stand_steps
-        begin = (state.time - steps * self.engine.control_dt) / state.duration
-        place = focus.place_of(world.pool, state.kind, state.region)
-        return place, state.getup, focus.bin_of(begin)
-
-    def _progress(
-        self, state: EpisodeState, output: StepOutput
-    ) -> tuple[curriculum.Curriculum | None, StepOutput]:
-        """The curriculum after a step, and the step's output with its metrics."""
-        if self.terrain is None or state.curriculum is None or state.region is None:
-            return None, output
-        success = output.episode["success"] == 1.0
-        progress = curriculum.advance(state.curriculum, self.terrain, success, state.region)
-        opened = jnp.full(len(success), progress.opened, jnp.float32)
-        return progress, output.replace(metrics=output.metrics | {"regions_open": opened})
-
-    def _learned(
-        self, world: World, state: EpisodeState, output: StepOutput
-    ) -> tuple[jax.Array | None, jax.Array | None]:
-        """The focus and the hand's levels after the episodes that end with this step."""
-        if state.focus is None:
-            return None, None
-        cell = self._cell(world, state)
-        success = output.truncated & stands(state.record)
-        ended = (output.terminated | output.truncated) & self._counts(state)
-        learned = focus.update(state.focus, cell, ended & self._alone(state), success)
-        if state.assist is None:
-            return learned, None
-        return learned, assist.update(state.assist, cell, ended & ~self._alone(state), success)
-
-    def _counts(self, state: EpisodeState) -> jax.Array:
-        """Which episodes [B] can end standing; one that is cut short says nothing about success."""
-        full = jnp.ones(len(state.time), bool)
-        return full if state.until is None else jnp.isinf(state.until)
-
-    def _alone(self, state: EpisodeState) -> jax.Array:
-        """Which episodes [B] have no helping hand."""
-        alone = jnp.ones(len(state.time), bool)
-        return alone if state.lift is None else state.lift == 0.0
 
     def start(
         self,
@@ -234,7 +193,7 @@ class GetUpTask:
     def _verdict(self, state: EpisodeState, truncated: jax.Array) -> dict[str, jax.Array]:
         episode = verdict(state, truncated, self._full_steps(state))
         if state.until is not None or state.lift is not None:
-            whole = self._counts(state) & self._alone(state)
+            whole = practice.runs_to_the_end(state) & practice.is_alone(state)
             episode = {name: jnp.where(whole, x, jnp.nan) for name, x in episode.items()}
         if state.region is None:
             return episode

@@ -1,0 +1,63 @@
+"""What a batch of training episodes tells about its starts, for those that come next."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+
+from getup_jax.config import TerrainConfig
+from getup_jax.tasks import assist, curriculum, focus
+from getup_jax.tasks.episode import EpisodeState, stands
+from getup_jax.tasks.reset_pool import Pool
+from getup_jax.types import StepOutput
+
+
+def first_cell(pool: Pool, state: EpisodeState, control_dt: float) -> tuple[jax.Array, ...]:
+    """Indices [B] of the cells of `focus.py` in which the episodes started."""
+    steps = state.record.rise_steps + state.record.stand_steps
+    begin = (state.time - steps * control_dt) / state.duration
+    place = focus.place_of(pool, state.kind, state.region)
+    return place, state.getup, focus.bin_of(begin)
+
+
+def runs_to_the_end(state: EpisodeState) -> jax.Array:
+    """Which episodes [B] can end standing; one that is cut short says nothing about success."""
+    whole = jnp.ones(len(state.time), bool)
+    return whole if state.until is None else jnp.isinf(state.until)
+
+
+def is_alone(state: EpisodeState) -> jax.Array:
+    """Which episodes [B] have no helping hand."""
+    alone = jnp.ones(len(state.time), bool)
+    return alone if state.lift is None else state.lift == 0.0
+
+
+def learned(
+    pool: Pool, state: EpisodeState, output: StepOutput, control_dt: float
+) -> tuple[jax.Array | None, jax.Array | None]:
+    """The focus and the hand's levels [3 R, G, bins] after the episodes that end with this step.
+
+    None where there is no focus, or no hand.
+    """
+    if state.focus is None:
+        return None, None
+    cell = first_cell(pool, state, control_dt)
+    success = output.truncated & stands(state.record)
+    ended = (output.terminated | output.truncated) & runs_to_the_end(state)
+    alone = is_alone(state)
+    after = focus.update(state.focus, cell, ended & alone, success)
+    if state.assist is None:
+        return after, None
+    return after, assist.update(state.assist, cell, ended & ~alone, success)
+
+
+def progress(
+    terrain: TerrainConfig | None, state: EpisodeState, output: StepOutput
+) -> tuple[curriculum.Curriculum | None, StepOutput]:
+    """The curriculum after a step, None on a flat plane, and the output with its metrics."""
+    if terrain is None or state.curriculum is None or state.region is None:
+        return None, output
+    success = output.episode["success"] == 1.0
+    after = curriculum.advance(state.curriculum, terrain, success, state.region)
+    opened = jnp.full(len(success), after.opened, jnp.float32)
+    return after, output.replace(metrics=output.metrics | {"regions_open": opened})
