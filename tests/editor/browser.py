@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-_FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+# nothing else: what the browser does by itself where there is no GPU is what is to be tested
+_FLAGS = ("--no-sandbox",)
 _EDIT = "import sys; from getup_jax.cli import edit_main; sys.exit(edit_main(sys.argv[1:]))"
 
 

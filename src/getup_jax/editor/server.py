@@ -26,6 +26,7 @@ from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.editor import messages
 from getup_jax.editor.answers import answer
 from getup_jax.editor.messages import Request
+from getup_jax.editor.outbox import Outbox
 from getup_jax.editor.scene import describe
 from getup_jax.editor.session import Session, error_message
 from getup_jax.editor.simulate import Simulator
@@ -33,7 +34,6 @@ from getup_jax.editor.site import Site
 
 _MAX_BYTES = messages.MAX_FILE_BYTES + messages.MAX_TEXT_BYTES
 _MAX_PAGES = 16
-_MAX_UNSENT = 4000  # messages that wait for a page that does not read them
 _SLOW = 2  # imports and exports at once
 
 Build = Callable[[Callable[[str], None]], tuple[Session, dict[str, Any]]]
@@ -196,33 +196,6 @@ class App:
             if not type(error).__module__.startswith("getup_jax."):
                 warnings.warn(f"{request.type}: {type(error).__name__}: {error}", stacklevel=2)
             box.put(error_message(request, error))
-
-
-class Outbox:
-    """What a page is still to be sent; a page that reads too slowly is closed."""
-
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self._loop = loop
-        self._queue: asyncio.Queue[str | bytes] = asyncio.Queue()
-
-    def put(self, message: str | bytes) -> None:
-        """Send it after what waits already; from the loop's own thread."""
-        self._queue.put_nowait(message)
-
-    def put_from_thread(self, message: str | bytes) -> None:
-        """The same from any thread; nothing happens where the loop has ended."""
-        with contextlib.suppress(RuntimeError):
-            self._loop.call_soon_threadsafe(self.put, message)
-
-    async def drain(self, connection: ServerConnection) -> None:
-        """Send for as long as the page is there."""
-        with contextlib.suppress(ConnectionClosed):
-            while True:
-                message = await self._queue.get()
-                if self._queue.qsize() > _MAX_UNSENT:
-                    await connection.close(1013, "the page reads too slowly")
-                    return
-                await connection.send(message)
 
 
 def _status(state: str, text: str) -> str:

@@ -114,7 +114,6 @@ class Simulator:
         The simulation goes on after an early end, since one wants to see what happens; scores
         are of the episode alone. Stop between two chunks by no longer asking.
         """
-        gap = self.starts.gap(curve)
         getup = curve.getups()[0]
         world = self.task.world.replace(
             pool=self.starts.pool(curve, place),
@@ -142,7 +141,7 @@ class Simulator:
             time=whole.time[:, 0],
             control_dt=self.control_dt,
             scores=self._scores(whole),
-            start_gap_rad=gap,
+            start_gap_rad=self.starts.gap(curve),
         )
 
     def finish(self, curve: CurveFile, place: Place = ANYWHERE) -> Motion:

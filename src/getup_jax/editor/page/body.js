@@ -1,6 +1,6 @@
 // The character as three.js meshes: a group a link, posed by positions and quaternions.
 
-import { BoxGeometry, CapsuleGeometry, Color, Group, Mesh, MeshStandardMaterial, SphereGeometry } from "./vendor/three.min.js";
+import { BoxGeometry, CapsuleGeometry, Color, Group, Mesh, MeshLambertMaterial, SphereGeometry } from "./vendor/three.min.js";
 
 export const TINTS = ["#3f74b5", "#b8862b", "#8a55ad", "#2f8f6b"]; // of the variants
 
@@ -14,7 +14,7 @@ export class Body {
   }
 
   mesh(shape) {
-    const material = new MeshStandardMaterial({ color: new Color(...shape.colour).convertSRGBToLinear(), roughness: 0.75 });
+    const material = new MeshLambertMaterial({ color: new Color(...shape.colour).convertSRGBToLinear() });
     material.userData.own = material.color.clone();
     this.materials.push(material);
     const mesh = new Mesh(geometry(shape), material);
@@ -49,8 +49,18 @@ export class Body {
   }
 }
 
+// All bodies share them: a key is a shape's kind and size.
+const known = new Map();
+
 function geometry({ kind, size }) {
-  if (kind === "sphere") return new SphereGeometry(size[0], 24, 16);
+  const key = `${kind} ${size}`;
+  if (!known.has(key)) known.set(key, made(kind, size));
+  return known.get(key);
+}
+
+// As few triangles as still look round: a renderer without a GPU pays for each of them.
+function made(kind, size) {
+  if (kind === "sphere") return new SphereGeometry(size[0], 18, 12);
   if (kind === "box") return new BoxGeometry(2 * size[0], 2 * size[1], 2 * size[2]);
-  return new CapsuleGeometry(size[0], 2 * size[1], 8, 20).rotateX(Math.PI / 2); // MuJoCo's lie along z
+  return new CapsuleGeometry(size[0], 2 * size[1], 5, 14).rotateX(Math.PI / 2); // MuJoCo's lie along z
 }

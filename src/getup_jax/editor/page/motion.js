@@ -3,7 +3,7 @@
 const DEGREES = 180 / Math.PI;
 
 export class Motion {
-  constructor(number, total, links) {
+  constructor(number, total, links, ground) {
     this.number = number;
     this.total = total;
     this.links = links;
@@ -12,7 +12,7 @@ export class Motion {
     this.poses = new Float32Array(total * links * 7);
     this.features = [new Float32Array(total), new Float32Array(total), new Float32Array(total)];
     this.result = null;
-    this.ground = null;
+    this.ground = ground; // null: flat
   }
 
   add(message) {

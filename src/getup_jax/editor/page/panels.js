@@ -1,8 +1,8 @@
 // Three panels with the curves: target, points to drag, achieved, ghosts, the guide's band.
 
 import { FEATURES, POINTS, sample } from "./spline.js";
+import { make, set, text } from "./svg.js";
 
-const NS = "http://www.w3.org/2000/svg";
 const LEFT = 40, RIGHT = 12, TOP = 22, BOTTOM = 20;
 const KINDS = {
   height: { title: "Neck height", unit: "m", low: 0, high: 1.7, step: 0.01, digits: 3, ticks: [0, 0.5, 1, 1.5] },
@@ -89,7 +89,7 @@ class Panel {
       dot.removeEventListener("pointercancel", end);
       dot.classList.remove("held");
       this.held = null;
-      this.model.store.commit();
+      this.model.store.commit(undefined, e.timeStamp);
     };
     dot.addEventListener("pointermove", move);
     dot.addEventListener("pointerup", end);
@@ -103,7 +103,7 @@ class Panel {
     if (sign !== undefined) {
       event.preventDefault();
       this.set(i, this.values[i] + sign * this.kind.step * (event.shiftKey ? 5 : 1));
-      this.model.store.commit();
+      this.model.store.commit(undefined, event.timeStamp);
     } else if (turn !== undefined) {
       event.preventDefault();
       this.points[Math.min(Math.max(i + turn, 0), POINTS - 1)].focus();
@@ -124,16 +124,29 @@ class Panel {
 
   draw() {
     if (!this.model.store.variants.length) return;
-    this.width = this.box.clientWidth;
-    this.height = this.box.clientHeight;
-    this.svg.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
-    this.back.replaceChildren(...this.drawBack());
+    this.measure();
+    this.drawBack();
     this.lines.replaceChildren(...this.drawBand(), ...this.drawLines());
     this.drawPoints();
     this.drawTime();
   }
 
+  measure() {
+    const { clientWidth: width, clientHeight: height } = this.box;
+    if (width === this.width && height === this.height) return;
+    Object.assign(this, { width, height });
+    set(this.svg, { viewBox: `0 0 ${width} ${height}` });
+  }
+
+  // Grid and words, made anew only where they change: most edits leave them as they are.
   drawBack() {
+    const shown = [this.width, this.height, this.model.span(), this.model.store.curve.durations[0], ...(this.held ?? this.range())].join();
+    if (shown === this.shown) return;
+    this.shown = shown;
+    this.back.replaceChildren(...this.backParts());
+  }
+
+  backParts() {
     const parts = [];
     for (const tick of this.kind.ticks) {
       parts.push(make("line", { class: "grid", x1: LEFT, x2: this.width - RIGHT, y1: this.y(tick), y2: this.y(tick) }));
@@ -201,31 +214,17 @@ class Panel {
     const duration = this.model.store.curve.durations[0];
     this.points.forEach((dot, i) => {
       const value = this.values[i];
-      dot.setAttribute("cx", this.x((i / (POINTS - 1)) * duration));
-      dot.setAttribute("cy", this.y(value));
-      dot.setAttribute("aria-label", `${this.kind.title}, point ${i + 1} of ${POINTS}`);
-      dot.setAttribute("aria-valuenow", value);
-      dot.setAttribute("aria-valuemin", this.kind.low);
-      dot.setAttribute("aria-valuemax", this.kind.high);
-      dot.setAttribute("aria-valuetext", `${value} ${this.kind.unit}`);
+      set(dot, {
+        cx: this.x((i / (POINTS - 1)) * duration), cy: this.y(value),
+        "aria-label": `${this.kind.title}, point ${i + 1} of ${POINTS}`, "aria-valuetext": `${value} ${this.kind.unit}`,
+        "aria-valuenow": value, "aria-valuemin": this.kind.low, "aria-valuemax": this.kind.high,
+      });
     });
   }
 
   drawTime() {
     if (!this.width) return;
     const x = this.x(Math.min(this.model.time(), this.model.span()));
-    for (const [key, value] of Object.entries({ x1: x, x2: x, y1: TOP, y2: this.height - BOTTOM })) this.now.setAttribute(key, value);
+    set(this.now, { x1: x, x2: x, y1: TOP, y2: this.height - BOTTOM });
   }
-}
-
-function make(name, attributes = {}) {
-  const element = document.createElementNS(NS, name);
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-  return element;
-}
-
-function text(x, y, content, attributes = {}) {
-  const element = make("text", { x, y, ...attributes });
-  element.textContent = content;
-  return element;
 }

@@ -46,9 +46,19 @@ export class Player {
         }
       }
     }
-    this.elements.scrub.value = this.time / Math.max(this.model.span(), 1e-6);
-    this.elements.clock.textContent = `${this.time.toFixed(2)} s`;
-    this.onFrame(seconds);
+    this.show();
+    this.onFrame();
+  }
+
+  // Words and lines change with the motion's frames, not with those of the screen.
+  show() {
+    const { scrub, clock } = this.elements, step = this.model.controlDt || 0.01;
+    const shown = `${Math.round(this.time / step)} of ${this.model.span()}`;
+    this.moved = shown !== this.shown;
+    if (!this.moved) return;
+    this.shown = shown;
+    scrub.value = this.time / Math.max(this.model.span(), 1e-6);
+    clock.textContent = `${this.time.toFixed(2)} s`;
   }
 
   // The frame of a motion at this time, as far as it has arrived.

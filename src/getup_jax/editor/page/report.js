@@ -25,6 +25,9 @@ export class Report {
     scores.textContent = parts.join(" · ");
   }
 
+  // An edit is under way.
+  measuring() { Object.assign(this.elements.latency.dataset, { first: "", whole: "" }); }
+
   latency(firstMs, wholeMs, seconds) {
     const { latency } = this.elements;
     latency.dataset.first = firstMs;

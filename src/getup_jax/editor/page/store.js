@@ -33,8 +33,8 @@ export class Store extends EventTarget {
     this.changed("live");
   }
 
-  // The end of a gesture, or a change at once.
-  commit(change = () => {}) {
+  // The end of a gesture, or a change at once; at: when it ended.
+  commit(change = () => {}, at = performance.now()) {
     change(this.current);
     const now = this.snapshot();
     if (now !== this.stamp) {
@@ -43,7 +43,7 @@ export class Store extends EventTarget {
       this.future = [];
       this.stamp = now;
     }
-    this.changed("commit");
+    this.changed("commit", at);
   }
 
   undo() { this.step(this.past, this.future); }
@@ -54,7 +54,7 @@ export class Store extends EventTarget {
     to.push(this.stamp);
     this.stamp = from.pop();
     ({ variants: this.variants, active: this.active } = JSON.parse(this.stamp));
-    this.changed("commit");
+    this.changed("commit", performance.now());
   }
 
   // Replaces the curve of the active variant; reset goes back to it.
@@ -87,9 +87,10 @@ export class Store extends EventTarget {
 
   snapshot() { return JSON.stringify({ variants: this.variants, active: this.active }); }
 
-  changed(kind) {
+  // at: when a gesture ended; null while it goes on, and where nothing was edited.
+  changed(kind, at = null) {
+    this.dispatchEvent(new CustomEvent("change", { detail: { kind, at } }));
     if (kind !== "live") sessionStorage.setItem(KEY, this.snapshot());
-    this.dispatchEvent(new CustomEvent("change", { detail: kind }));
   }
 
   restore() {

@@ -2,18 +2,24 @@
 
 import {
   BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Fog, HemisphereLight, LineBasicMaterial, LineSegments, Mesh,
-  MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, PlaneGeometry, Scene, Vector3, WebGLRenderer,
+  MeshLambertMaterial, PCFShadowMap, PerspectiveCamera, PlaneGeometry, Scene, Vector3, WebGLRenderer,
 } from "./vendor/three.min.js";
 import { Body } from "./body.js";
+import { drawsInSoftware, Fence } from "./gpu.js";
 
 const LOOK_AT_M = 0.6; // above the ground
-const SLOW_S = 0.07; // a frame; drawn more plainly when slower than this
+const STILL_M = 0.002; // the camera does not follow less than this
+const SLOW_MS = 50; // a picture; they are drawn more plainly when slower than this
 
 export class View {
   constructor(canvas, scene) {
     this.canvas = canvas;
     this.spec = scene;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    this.software = drawsInSoftware();
+    this.plain = this.software;
+    this.mean = 0;
+    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software });
+    this.fence = new Fence(this.renderer.getContext());
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.scene = new Scene();
@@ -33,7 +39,7 @@ export class View {
   light() {
     this.scene.add(new HemisphereLight("#ffffff", "#9aa3ad", 1.5));
     this.sun = new DirectionalLight("#ffffff", 2.2);
-    this.sun.castShadow = true;
+    this.sun.castShadow = !this.plain;
     this.sun.shadow.mapSize.set(1024, 1024);
     Object.assign(this.sun.shadow.camera, { left: -2.5, right: 2.5, top: 2.5, bottom: -2.5, near: 1, far: 12 });
     this.sun.shadow.bias = -0.0005;
@@ -56,7 +62,7 @@ export class View {
       this.scene.remove(...this.floor);
       for (const part of this.floor) { part.geometry.dispose(); part.material.dispose(); }
     }
-    const material = new MeshStandardMaterial({ color: this.colours.floor, roughness: 1, side: DoubleSide, flatShading: Boolean(ground) });
+    const material = new MeshLambertMaterial({ color: this.colours.floor, side: DoubleSide, flatShading: Boolean(ground) });
     Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 }); // the lines lie on it
     if (ground) {
       this.floor = [new Mesh(landscape(ground), material)];
@@ -70,23 +76,29 @@ export class View {
 
   // One body a variant; the active one is solid, the others are ghosts.
   arrange(count, active) {
+    if (this.arranged === `${active} of ${count}`) return;
+    this.arranged = `${active} of ${count}`;
     while (this.bodies.length < count) {
       const body = new Body(this.spec.shapes, this.spec.links.length);
       body.group.visible = false;
+      body.shown = null;
       this.bodies.push(body);
       this.scene.add(body.group);
     }
     this.bodies.forEach((body, slot) => {
-      if (slot >= count) body.group.visible = false;
+      if (slot >= count) Object.assign(body, { shown: null }).group.visible = false;
       body.dress(slot !== active, slot);
     });
     this.dirty = true;
   }
 
-  pose(slot, values) {
-    const body = this.bodies[slot];
-    body.group.visible = values !== null;
-    if (values) body.pose(values);
+  // A frame of a variant's motion; null hides the variant.
+  pose(slot, motion, frame) {
+    const body = this.bodies[slot], shown = motion && `${motion.number} ${frame}`;
+    if (body.shown === shown) return;
+    body.shown = shown;
+    body.group.visible = motion !== null;
+    if (motion) body.pose(motion.pose(frame));
     this.dirty = true;
   }
 
@@ -99,12 +111,19 @@ export class View {
 
   centre(values, share) {
     const level = this.ground ? heightAt(this.ground, values[0], values[1]) : 0;
-    this.target.lerp(new Vector3(values[0], values[1], level + LOOK_AT_M), share);
+    const aim = new Vector3(values[0], values[1], level + LOOK_AT_M);
+    if (aim.distanceTo(this.target) < STILL_M) return;
+    this.target.lerp(aim, share);
     this.dirty = true;
   }
 
-  draw() {
-    if (!this.dirty) return;
+  // Draws if something changed; never before the last picture is done, since pictures that queue up
+  // show late. `now` is for a picture that a person waits for: others leave a processor that draws by
+  // itself as long a rest as they took. Returns whether all of it is given to the renderer.
+  draw(now = false) {
+    if (!this.dirty) return true;
+    const rest = this.software && !now ? this.fence.took : 0;
+    if (this.fence.waiting || performance.now() < this.fence.free + rest) return false;
     this.dirty = false;
     const { azimuth, elevation, distance } = this.orbit;
     const flat = distance * Math.cos(elevation);
@@ -116,12 +135,15 @@ export class View {
     this.sun.position.copy(this.target).add(new Vector3(1.6, -1.2, 4.5));
     this.sun.target.position.copy(this.target);
     this.renderer.render(this.scene, this.camera);
+    this.fence.set();
+    this.fence.then(() => this.pace(this.fence.took));
+    return true;
   }
 
-  // seconds since the last frame of the page: without a GPU shadows and sharp edges cost too much.
-  pace(seconds) {
-    this.mean = 0.9 * (this.mean ?? 0) + 0.1 * Math.min(seconds, 0.5);
-    if (this.plain || this.mean < SLOW_S) return;
+  // Without shadows and sharp edges where they cost too much.
+  pace(took) {
+    this.mean += 0.1 * (Math.min(took, 500) - this.mean);
+    if (this.plain || this.mean < SLOW_MS) return;
     this.plain = true;
     this.sun.castShadow = false;
     this.resize();
@@ -130,7 +152,7 @@ export class View {
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    this.renderer.setPixelRatio(this.plain ? 0.75 : Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(this.plain ? Math.min(devicePixelRatio, this.software ? 1 : 0.75) : Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / Math.max(height, 1);
     this.camera.updateProjectionMatrix();
