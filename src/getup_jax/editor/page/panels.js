@@ -150,7 +150,7 @@ class Panel {
     const parts = [];
     for (const tick of this.kind.ticks) {
       parts.push(make("line", { class: "grid", x1: LEFT, x2: this.width - RIGHT, y1: this.y(tick), y2: this.y(tick) }));
-      parts.push(text(LEFT - 6, this.y(tick) + 3.5, String(tick), { "text-anchor": "end" }));
+      parts.push(text(LEFT - 9, this.y(tick) + 3.5, String(tick), { "text-anchor": "end" }));
     }
     for (let t = 0; t <= this.model.span() + 1e-6; t += 1) {
       parts.push(make("line", { class: "grid", x1: this.x(t), x2: this.x(t), y1: TOP, y2: this.height - BOTTOM }));
@@ -184,7 +184,7 @@ class Panel {
     const { store, motions, controlDt } = this.model;
     const parts = [];
     store.variants.forEach((variant, slot) => {
-      if (slot !== store.active) parts.push(...this.achieved(motions[slot], controlDt, "ghost", "ghost"));
+      if (slot !== store.active) parts.push(...this.achieved(motions[slot], controlDt, `ghost of${slot}`, `ghost of${slot}`));
     });
     const duration = store.curve.durations[0];
     const target = sample(this.values);

@@ -22,7 +22,7 @@ export class Report {
     if (result.start_gap_deg > matchDeg) {
       parts.unshift(`⚠ the curve starts ${result.start_gap_deg.toFixed(0)}° from the start pose (at most ${matchDeg.toFixed(0)}°)`);
     }
-    scores.textContent = parts.join(" · ");
+    scores.replaceChildren(...parts.flatMap((part, i) => [whole(i + 1 < parts.length ? `${part} ·` : part), " "]));
   }
 
   // An edit is under way.
@@ -32,9 +32,16 @@ export class Report {
     const { latency } = this.elements;
     latency.dataset.first = firstMs;
     latency.dataset.whole = wholeMs ?? "";
-    const whole = wholeMs === null ? "" : `, all ${seconds.toFixed(1)} s of motion after ${wholeMs.toFixed(0)} ms`;
-    latency.textContent = `last edit: first new frame after ${firstMs.toFixed(0)} ms${whole}`;
+    const whole = wholeMs === null ? "" : `, all ${seconds.toFixed(1)} s after ${wholeMs.toFixed(0)} ms`;
+    latency.textContent = `first new frame after ${firstMs.toFixed(0)} ms${whole}`;
   }
+}
+
+// Words that stay on one line.
+function whole(text) {
+  const element = document.createElement("span");
+  element.textContent = text;
+  return element;
 }
 
 function number(value, digits) { return value === null || Number.isNaN(value) ? "–" : value.toFixed(digits); }

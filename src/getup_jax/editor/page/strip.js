@@ -4,7 +4,7 @@
 import { Color, DirectionalLight, Group, HemisphereLight, OrthographicCamera, Scene, WebGLRenderer } from "./vendor/three.min.js";
 import { Body } from "./body.js";
 import { Fence } from "./gpu.js";
-import { heightAt } from "./view.js";
+import { heightAt } from "./ground.js";
 
 const POSES = 7;
 const SPACING_M = 1.8;

@@ -1,13 +1,15 @@
 // The 3-D view: ground, the variants' bodies, light, and a camera that orbits and follows.
 
 import {
-  BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Fog, HemisphereLight, LineBasicMaterial, LineSegments, Mesh,
-  MeshLambertMaterial, PCFShadowMap, PerspectiveCamera, PlaneGeometry, Scene, Vector3, WebGLRenderer,
+  Color, DirectionalLight, Fog, HemisphereLight, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer,
 } from "./vendor/three.min.js";
 import { Body } from "./body.js";
 import { drawsInSoftware, Fence } from "./gpu.js";
+import { heightAt, makeGround } from "./ground.js";
 
 const LOOK_AT_M = 0.6; // above the ground
+const FOG_M = [9, 26]; // from the camera
+const FOG_PATCH_M = [4.5, 10.5]; // a piece of irregular ground fades before its edge
 const STILL_M = 0.002; // the camera does not follow less than this
 const SLOW_MS = 50; // a picture; they are drawn more plainly when slower than this
 
@@ -51,8 +53,7 @@ export class View {
     const style = getComputedStyle(document.documentElement);
     const colour = (name) => style.getPropertyValue(name).trim();
     this.scene.background = new Color(colour("--sky"));
-    this.scene.fog = new Fog(colour("--sky"), 9, 26);
-    this.colours = { floor: colour("--floor"), line: colour("--floor-line") };
+    this.colours = { sky: colour("--sky"), floor: colour("--floor"), line: colour("--floor-line") };
     this.setGround(this.ground ?? null);
   }
 
@@ -62,14 +63,9 @@ export class View {
       this.scene.remove(...this.floor);
       for (const part of this.floor) { part.geometry.dispose(); part.material.dispose(); }
     }
-    const material = new MeshLambertMaterial({ color: this.colours.floor, side: DoubleSide, flatShading: Boolean(ground) });
-    Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 }); // the lines lie on it
-    if (ground) {
-      this.floor = [new Mesh(landscape(ground), material)];
-    } else {
-      this.floor = [new Mesh(new PlaneGeometry(80, 80), material), lines(this.colours.line)];
-    }
-    this.floor[0].receiveShadow = true;
+    this.floor = makeGround(ground, this.colours);
+    const [near, far] = ground ? FOG_PATCH_M : FOG_M;
+    this.scene.fog = new Fog(this.colours.sky, near, far);
     this.scene.add(...this.floor);
     this.dirty = true;
   }
@@ -183,39 +179,4 @@ export class View {
       }
     });
   }
-}
-
-// A line every metre of the flat ground, in pieces: some renderers drop lines that reach behind the camera.
-function lines(colour) {
-  const half = 20;
-  const ends = [];
-  for (let i = -half; i <= half; i++) {
-    for (let j = -half; j < half; j++) ends.push(i, j, 0.004, i, j + 1, 0.004, j, i, 0.004, j + 1, i, 0.004);
-  }
-  const geometry = new BufferGeometry();
-  geometry.setAttribute("position", new BufferAttribute(new Float32Array(ends), 3));
-  return new LineSegments(geometry, new LineBasicMaterial({ color: colour }));
-}
-
-// Height field triangles as MuJoCo cuts the cells: from the lower to the upper corner in x and y.
-function landscape({ origin, step, points, heights }) {
-  const position = new Float32Array(points * points * 3);
-  const index = [];
-  for (let row = 0; row < points; row++) {
-    for (let column = 0; column < points; column++) {
-      const i = row * points + column;
-      position.set([origin[0] + column * step, origin[1] + row * step, heights[i]], 3 * i);
-      if (row + 1 < points && column + 1 < points) index.push(i, i + 1, i + points + 1, i, i + points + 1, i + points);
-    }
-  }
-  const geometry = new BufferGeometry();
-  geometry.setAttribute("position", new BufferAttribute(position, 3));
-  geometry.setIndex(index);
-  geometry.computeVertexNormals();
-  return geometry;
-}
-
-export function heightAt({ origin, step, points, heights }, x, y) {
-  const clamp = (v) => Math.min(Math.max(Math.round(v), 0), points - 1);
-  return heights[clamp((y - origin[1]) / step) * points + clamp((x - origin[0]) / step)];
 }
