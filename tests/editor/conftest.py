@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import pytest
+from edit_running import Quick, running
 from edit_samples import make_curve, make_simulator
 
 from getup_jax.checkpoint import LoadedPolicy
@@ -20,3 +21,10 @@ def simulator(tiny) -> Simulator:
 @pytest.fixture(scope="session")
 def motion(simulator) -> Motion:
     return simulator.finish(make_curve())
+
+
+@pytest.fixture(scope="session")
+def site(simulator):
+    session = Quick(simulator)
+    with running(lambda log: (session, {"name": "scene"})) as server:
+        yield server.wait(2)

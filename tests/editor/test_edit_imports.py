@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import dataclasses
+import io
+import zipfile
 
 import numpy as np
 import pytest
@@ -50,8 +52,19 @@ def test_what_holds_no_get_up_is_refused_with_a_reason(rising, motion, simulator
         MotionError, match=r"still\.npz: no get-up in 2 s; expected a body that lies"
     ):
         curves_of("still.npz", content, simulator.character)
+    with pytest.raises(
+        MotionError, match=r"bomb\.npz: expected at most 256 MB unpacked, got 300 MB"
+    ):
+        curves_of("bomb.npz", _packed_zeros(300_000_000), simulator.character)
     with pytest.raises(MotionError, match=r"take\.fbx: expected a file that ends in \.bvh"):
         curves_of("take.fbx", b"", simulator.character)
+
+
+def _packed_zeros(size: int) -> bytes:
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file:
+        file.writestr("qpos.npy", bytes(size))
+    return packed.getvalue()
 
 
 @pytest.mark.slow

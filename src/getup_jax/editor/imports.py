@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import re
 import tempfile
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ from getup_jax.motion.readers import SUFFIXES, ReadOptions
 from getup_jax.motion.retarget import RetargetSettings
 from getup_jax.physics.character import CharacterSpec
 
+_MAX_UNPACKED_BYTES = 256_000_000  # of an npz file, which may be packed very tightly
 _MOST = 20  # get-ups taken from one file
 _DIGITS = 6  # of the start pose
 
@@ -28,6 +31,8 @@ def curves_of(name: str, content: bytes, character: CharacterSpec) -> list[Curve
     if suffix not in known or suffix == ".amc":
         takes = ", ".join(kind for kind in known if kind != ".amc")
         raise MotionError(f"{name}: expected a file that ends in {takes}")
+    if suffix == ".npz":
+        _check_unpacked(name, content)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{_plain(Path(name).stem)}{suffix}"
         path.write_bytes(content)
@@ -40,6 +45,19 @@ def curves_of(name: str, content: bytes, character: CharacterSpec) -> list[Curve
         )
     good = [getup for getup in getups if DURATION_S[0] <= getup.duration <= DURATION_S[1]]
     return [_curve(getup) for getup in good[:_MOST]]
+
+
+def _check_unpacked(name: str, content: bytes) -> None:
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as file:
+            size = sum(part.file_size for part in file.infolist())
+    except (zipfile.BadZipFile, ValueError, OSError) as error:
+        raise MotionError(f"{name}: not a clip: {error}") from None
+    if size > _MAX_UNPACKED_BYTES:
+        raise MotionError(
+            f"{name}: expected at most {_MAX_UNPACKED_BYTES // 1_000_000} MB unpacked, got "
+            f"{size // 1_000_000} MB"
+        )
 
 
 def _clip(path: Path, character: CharacterSpec) -> Clip:

@@ -150,10 +150,10 @@ class App:
         if len(self._boxes) >= _MAX_PAGES:
             await connection.close(1013, f"at most {_MAX_PAGES} pages at once")
             return
-        page, box = next(self._pages), Outbox(asyncio.get_running_loop())
+        page, box = next(self._pages), Outbox(connection)
         self._boxes[page] = box
         box.put(self._hello)
-        sender = asyncio.create_task(box.drain(connection))
+        sender = asyncio.create_task(box.drain())
         tasks: set[asyncio.Task[None]] = set()
         try:
             async for message in connection:
