@@ -1,20 +1,34 @@
-"""The editor in a real browser: a server in a process of its own, and headless Chromium."""
+"""The editor in a real browser: a server in a process of its own, and headless Chromium.
+
+Needs Debian's chromium and `pip install 'getup-jax[browser]'`. GETUP_EDIT_SHOTS names a folder
+for screenshots.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+import pytest
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 # nothing else: what the browser does by itself where there is no GPU is what is to be tested
 _FLAGS = ("--no-sandbox",)
+BROWSER = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt install chromium)"),
+]
+HEIGHT = "Neck height"
 _EDIT = "import sys; from getup_jax.cli import edit_main; sys.exit(edit_main(sys.argv[1:]))"
 
 
@@ -67,11 +81,16 @@ def drag(page: Any, panel: str, point: int, pixels: int) -> None:
 
 def wait_for_result(page: Any, before: str) -> None:
     """Until the motion of a newer edit than number `before` is whole."""
-    page.wait_for_function(
-        "before => Number(document.body.dataset.shown) > before", arg=int(before), timeout=60_000
-    )
+    wait_for_number(page, before)
     page.wait_for_function(
         "() => document.getElementById('latency').dataset.whole > 0", timeout=60_000
+    )
+
+
+def wait_for_number(page: Any, before: str) -> None:
+    """Until the motion of a newer edit than number `before` has come."""
+    page.wait_for_function(
+        "before => Number(document.body.dataset.shown) > before", arg=int(before), timeout=60_000
     )
 
 
@@ -79,3 +98,84 @@ def memory_mib(process: subprocess.Popen[str]) -> float:
     """The most memory that the server has used so far (MiB)."""
     status = Path(f"/proc/{process.pid}/status").read_text()
     return int(re.search(r"VmHWM:\s+(\d+) kB", status)[1]) / 1024
+
+
+def shot(page: Any, name: str) -> None:
+    """A screenshot for a person to look at, where one is asked for."""
+    folder = os.environ.get("GETUP_EDIT_SHOTS")
+    if folder:
+        page.screenshot(path=str(Path(folder) / f"{name}.png"))
+
+
+def shown(page: Any) -> str:
+    """The number of the newest edit whose motion is whole."""
+    return page.evaluate("document.body.dataset.shown")
+
+
+def drawn(page: Any) -> None:
+    """Until the page has drawn what was changed."""
+    page.evaluate("new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))")
+
+
+def value(page: Any, panel: str, point: int) -> float:
+    """A control point's value (m or degrees)."""
+    drawn(page)
+    dot = page.locator(f'[aria-label="{panel}"] [data-point="{point}"]')
+    return float(dot.get_attribute("aria-valuenow"))
+
+
+def achieved(page: Any) -> str:
+    """The line of the achieved height as the page draws it."""
+    drawn(page)
+    return page.locator(f'[aria-label="{HEIGHT}"] .achieved').first.get_attribute("points")
+
+
+def saved(page: Any, click: str, folder: Path) -> Path:
+    """The file that #save or a kind of export gives."""
+    with page.expect_download(timeout=60_000) as download:
+        page.click(click) if click.startswith("#save") else page.select_option("#export", click)
+    path = folder / download.value.suggested_filename
+    download.value.save_as(path)
+    return path
+
+
+def edited(page: Any, act: Callable[[], Any]) -> None:
+    """Do something that asks for a new motion, and wait until it is whole."""
+    before = shown(page)
+    act()
+    wait_for_result(page, before)
+
+
+def picture(page: Any, selector: str) -> np.ndarray:
+    """The pixels [height, width, 3] of an element, 0 to 1."""
+    from matplotlib.image import imread
+
+    return imread(io.BytesIO(page.locator(selector).screenshot()))[..., :3]
+
+
+def slowdown(seconds: float = 0.3) -> float:
+    """How many times longer work takes here now than on a core of its own."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    while time.process_time() - cpu < seconds:
+        pass
+    return (time.perf_counter() - wall) / (time.process_time() - cpu)
+
+
+def cpu_seconds() -> float:
+    """Processor time (s) of all processes that this one started: server, driver and browser."""
+    parent, seconds = {}, {}
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = file.read_text().rpartition(")")[2].split()
+            pid = int(file.parent.name)
+            parent[pid] = int(fields[1])
+            seconds[pid] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    def ours(pid: int) -> bool:
+        while pid in parent:
+            pid = parent[pid]
+            if pid == os.getpid():
+                return True
+        return False
+
+    return sum(value for pid, value in seconds.items() if ours(pid))

@@ -1,6 +1,10 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import pytest
+from browser import served
 from edit_running import Quick, running
 from edit_samples import make_curve, make_simulator
 
@@ -28,3 +32,11 @@ def site(simulator):
     session = Quick(simulator)
     with running(lambda log: (session, {"name": "scene"})) as server:
         yield server.wait(2)
+
+
+@pytest.fixture(scope="session")
+def page_server() -> Iterator[tuple[str, Any]]:
+    """A running `getup-edit` with the shipped policy: its address and its process."""
+    pytest.importorskip("playwright", reason="needs pip install 'getup-jax[browser]'")
+    with served("--port", "0") as running:
+        yield running

@@ -9,8 +9,9 @@ import numpy as np
 from tiny_task import getups, neutral_prior
 
 from eval_samples import SMALL, save_policy
-from getup_jax.checkpoint import LoadedPolicy, load_policy
+from getup_jax.checkpoint import CHECKPOINTS, LoadedPolicy, load_policy, save_learner
 from getup_jax.config import Config, TerrainConfig
+from getup_jax.editor.options import edit_parser
 from getup_jax.editor.simulate import Simulator, editor_config
 from getup_jax.motion.curve_file import CurveFile
 from getup_jax.physics.character import load_character
@@ -47,3 +48,12 @@ def make_ground_simulator(loaded: LoadedPolicy, terrain: TerrainConfig) -> Simul
     rows = dataclasses.replace(config.task, pool_size=8)
     config = dataclasses.replace(config, task=rows, terrain=terrain)
     return Simulator.of(config, make_task(config), loaded)
+
+
+def save_ground_policy(folder: Path, terrain: TerrainConfig) -> Path:
+    """The shipped policy as one of irregular ground, which it was not trained on, as a run."""
+    shipped = load_policy(edit_parser().get_default("ckpt"))
+    config = dataclasses.replace(shipped.config, terrain=terrain)
+    item = {"policy": shipped.policy, "prior": shipped.prior}
+    save_learner(folder / CHECKPOINTS, 1, shipped.policy, config, item)
+    return folder

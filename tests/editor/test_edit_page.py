@@ -1,134 +1,47 @@
-"""The page in headless Chromium, with the shipped policy; run by `make test-slow`.
-
-Needs Debian's chromium and `pip install 'getup-jax[browser]'`. GETUP_EDIT_SHOTS names a folder
-for screenshots.
-"""
+"""Editing in the page, in headless Chromium, with the shipped policy."""
 
 from __future__ import annotations
 
-import json
-import os
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import CHROMIUM, drag, memory_mib, opened, served, wait_for_result
+from browser import (
+    BROWSER,
+    HEIGHT,
+    achieved,
+    drag,
+    drawn,
+    edited,
+    opened,
+    picture,
+    served,
+    shot,
+    shown,
+    value,
+    wait_for_number,
+    wait_for_result,
+)
 
-from getup_jax import cli
-from getup_jax.motion.bvh import read_bvh
-from getup_jax.motion.curve_file import read_curve_file
-
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt install chromium)"),
-]
-HEIGHT = "Neck height"
-
-
-@pytest.fixture(scope="module")
-def server():
-    pytest.importorskip("playwright", reason="needs pip install 'getup-jax[browser]'")
-    with served("--port", "0") as running:
-        yield running
-
-
-def shot(page, name: str) -> None:
-    folder = os.environ.get("GETUP_EDIT_SHOTS")
-    if folder:
-        page.screenshot(path=str(Path(folder) / f"{name}.png"))
+pytestmark = BROWSER
 
 
-def shown(page) -> str:
-    return page.evaluate("document.body.dataset.shown")
-
-
-def drawn(page) -> None:
-    """Until the page has drawn what was changed."""
-    page.evaluate("new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))")
-
-
-def value(page, panel: str, point: int) -> float:
-    drawn(page)
-    dot = page.locator(f'[aria-label="{panel}"] [data-point="{point}"]')
-    return float(dot.get_attribute("aria-valuenow"))
-
-
-def achieved(page) -> str:
-    """The line of the achieved height as the page draws it."""
-    drawn(page)
-    return page.locator(f'[aria-label="{HEIGHT}"] .achieved').first.get_attribute("points")
-
-
-def saved(page, click: str, folder: Path) -> Path:
-    with page.expect_download(timeout=60_000) as download:
-        page.click(click) if click.startswith("#save") else page.select_option("#export", click)
-    path = folder / download.value.suggested_filename
-    download.value.save_as(path)
-    return path
-
-
-def test_a_drag_changes_the_motion_and_can_be_undone(server):
-    with opened(server[0]) as page:
-        before = shown(page)
-        page.fill("#seconds", "5")
-        page.press("#seconds", "Enter")
-        wait_for_result(page, before)  # 8 s with the standing phase
-        before, line, old = shown(page), achieved(page), value(page, HEIGHT, 4)
-        drag(page, HEIGHT, 4, 40)
-        wait_for_result(page, before)
+def test_a_drag_changes_the_motion_and_can_be_undone(page_server):
+    with opened(page_server[0]) as page:
+        line, old = achieved(page), value(page, HEIGHT, 4)
+        edited(page, lambda: drag(page, HEIGHT, 4, 40))
         assert value(page, HEIGHT, 4) > old + 0.1
         assert achieved(page) != line
         shot(page, "dragged")
-        first = float(page.locator("#latency").get_attribute("data-first"))
-        print(f"first new frame {first:.0f} ms after release: {page.inner_text('#latency')}")
-        print(f"memory of the server: {memory_mib(server[1]):.0f} MiB")
-        assert memory_mib(server[1]) < 1024
-        before = shown(page)
-        page.keyboard.press("Control+z")
-        wait_for_result(page, before)
+        edited(page, lambda: page.keyboard.press("Control+z"))
         assert value(page, HEIGHT, 4) == old
         assert achieved(page) == line
+        edited(page, lambda: page.keyboard.press("Control+Shift+Z"))
+        assert value(page, HEIGHT, 4) > old + 0.1
 
 
-def test_what_is_saved_opens_again_and_evaluates_the_same(server, tmp_path):
-    with opened(server[0], accept_downloads=True) as page:
-        before = shown(page)
-        page.fill("#name", "my_rise")
-        drag(page, HEIGHT, 5, -25)
-        wait_for_result(page, before)
-        file = saved(page, "#save", tmp_path)
-        scores, moved = page.inner_text("#scores"), value(page, HEIGHT, 5)
-        verdict = page.inner_text("#verdict")
-        page.evaluate("sessionStorage.clear()")
-        page.reload()
-        page.wait_for_selector("body[data-shown]", timeout=60_000)
-        assert value(page, HEIGHT, 5) != moved
-        before = shown(page)
-        page.set_input_files("#file-curve", str(file))
-        wait_for_result(page, before)
-        assert value(page, HEIGHT, 5) == moved
-        assert page.inner_text("#scores") == scores
-    assert read_curve_file(file).values[5, 0] == moved
-    out = tmp_path / "out.json"
-    assert cli.eval_main(["--curves", str(file), "--json", str(out)]) == 0
-    found = json.loads(out.read_text())
-    assert found["success"] == float(verdict.startswith("Stands"))
-    assert f"height error {found['height_error_m']:.3f} m" in scores
-    assert f"energy {found['energy_j']:.0f} J" in scores
-
-
-def test_exports(server, tmp_path):
-    with opened(server[0], accept_downloads=True) as page:
-        files = {kind: saved(page, kind, tmp_path) for kind in ("bvh", "npz", "csv")}
-    recording = read_bvh(files["bvh"])
-    with np.load(files["npz"]) as data:
-        assert len(data["qpos"]) == recording.num_frames
-    assert len(files["csv"].read_text().splitlines()) == recording.num_frames + 1
-
-
-def test_the_keyboard_moves_points_and_shift_mirror_reset_work(server):
-    with opened(server[0]) as page:
+def test_the_keyboard_moves_points_and_shift_mirror_reset_work(page_server):
+    with opened(page_server[0]) as page:
         start, old = shown(page), value(page, HEIGHT, 3)
         page.locator(f'[aria-label="{HEIGHT}"] [data-point="3"]').focus()
         page.keyboard.press("ArrowUp")
@@ -150,58 +63,103 @@ def test_the_keyboard_moves_points_and_shift_mirror_reset_work(server):
         wait_for_result(page, start)
 
 
-def test_a_variant_stays_as_a_ghost_and_dark_is_readable(server):
-    with opened(server[0], color_scheme="dark") as page:
-        page.click("text=+ variant")
-        before = shown(page)
-        drag(page, HEIGHT, 4, 30)
-        wait_for_result(page, before)
+def test_time_stops_moves_by_frames_and_follows_the_curves(page_server):
+    def clock() -> float:
+        drawn(page)
+        return float(page.inner_text("#clock").split()[0])
+
+    with opened(page_server[0]) as page:
+        page.locator("#view").focus()
+        page.keyboard.press("Space")
+        stopped = clock()
+        page.wait_for_timeout(300)
+        assert clock() == stopped
+        for key, frames in ((".", 1), (".", 2), (",", 1)):
+            page.keyboard.press(key)
+            assert clock() == pytest.approx(stopped + frames / 30, abs=0.02)
+        box = page.locator(f'[aria-label="{HEIGHT}"]').bounding_box()
+        page.mouse.click(box["x"] + 0.8 * box["width"], box["y"] + 0.5 * box["height"])
+        assert clock() > stopped + 1
+        before = picture(page, "#view")
+        page.locator("#view").focus()
+        page.keyboard.press("ArrowLeft")
+        page.wait_for_timeout(500)
+        assert np.abs(picture(page, "#view") - before).mean() > 0.001, "the camera did not turn"
+
+
+def test_the_strip_of_poses_follows_the_motion(page_server):
+    with opened(page_server[0]) as page:
+        page.wait_for_selector("#strip[data-drawn]")
+        sky = picture(page, "#strip")[8, 8]
+        first = picture(page, "#strip")
+        bodies = np.abs(first - sky).max(axis=2) > 0.1
+        columns = bodies.any(axis=0)
+        assert (np.diff(columns.astype(int)) == 1).sum() >= 5, "expected seven poses side by side"
+        number = page.get_attribute("#strip", "data-drawn")
+        edited(page, lambda: drag(page, HEIGHT, 4, -60))
+        page.wait_for_selector(f'#strip:not([data-drawn="{number}"])')
+        assert np.abs(picture(page, "#strip") - first).max() > 0.1
+
+
+def test_a_variant_stays_as_a_ghost_and_dark_is_readable(page_server):
+    with opened(page_server[0], color_scheme="dark") as page:
+        edited(page, lambda: page.click("text=+ variant"))
+        edited(page, lambda: drag(page, HEIGHT, 4, 30))
         page.select_option("#band", index=1)
         assert page.locator(".ghost").count() >= 3
         assert page.locator(".band").count() == 3
         page.wait_for_timeout(2500)
         shot(page, "variants_dark")
+        assert picture(page, "#view").mean() < 0.3, "the view is not dark"
         inside = page.evaluate(
             "[...document.querySelectorAll('button, select, input:not([hidden]), canvas, .panel')]"
             ".every(e => { const b = e.getBoundingClientRect();"
             " return b.bottom <= innerHeight && b.right <= innerWidth && b.left >= 0; })"
         )
         assert inside, "something is outside 1280 x 800"
+        page.click("#theme")
+        page.wait_for_timeout(2500)
+        shot(page, "variants_light")
+        assert picture(page, "#view").mean() > 0.7, "the view is not light"
+        page.click("#variants [role=tab] >> nth=0")
+        last = page.inner_text("#scores")
+        page.click('[aria-label="Remove this variant"]')
+        assert page.inner_text("#scores") != last
+        assert page.locator("[role=tab]").count() == 1
+        drawn(page)
+        assert page.locator(".ghost").count() == 0
 
 
-def test_a_lost_connection_keeps_the_edits(server):
+def test_a_lost_connection_keeps_the_edits_and_goes_on_with_them():
     with served("--port", "0") as (address, process), opened(address) as page:
-        drag(page, HEIGHT, 4, 30)
-        edited = value(page, HEIGHT, 4)
+        old = value(page, HEIGHT, 2)
+        edited(page, lambda: drag(page, HEIGHT, 4, 30))
+        fourth, line, last = value(page, HEIGHT, 4), achieved(page), shown(page)
         process.terminate()
         page.wait_for_selector("#banner:not([hidden])", timeout=20_000)
         assert "edits are kept" in page.inner_text("#banner")
+        shot(page, "lost")
         drag(page, HEIGHT, 2, 10)
-        further = value(page, HEIGHT, 2)
+        second = value(page, HEIGHT, 2)
         process.wait(timeout=30)
-        port = re.search(r":(\d+)", address)[1]
-        with served("--port", port):
+        with served("--port", re.search(r":(\d+)", address)[1]):
             page.wait_for_selector("#banner", state="hidden", timeout=60_000)
             page.wait_for_selector("#dot.ok")
-            assert (value(page, HEIGHT, 4), value(page, HEIGHT, 2)) == (edited, further)
+            wait_for_number(page, last)  # it was asked for again
+            assert (value(page, HEIGHT, 4), value(page, HEIGHT, 2)) == (fourth, second)
+            assert achieved(page) != line
+            edited(page, lambda: page.keyboard.press("Control+z"))
+            assert (value(page, HEIGHT, 4), value(page, HEIGHT, 2)) == (fourth, old)
+            assert achieved(page) == line
 
 
-def test_two_tabs_edit_for_themselves(server):
-    with opened(server[0]) as page:
+def test_two_tabs_edit_for_themselves(page_server):
+    with opened(page_server[0]) as page:
         other = page.context.new_page()
-        other.goto(server[0])
+        other.goto(page_server[0])
         other.wait_for_selector("body[data-shown]", timeout=60_000)
         line, before = achieved(other), shown(page)
         drag(page, HEIGHT, 4, 40)
         wait_for_result(page, before)
         assert achieved(other) == line
         assert achieved(page) != line
-
-
-def test_a_file_that_is_no_curve_file_is_refused_with_a_reason(server, tmp_path):
-    bad = tmp_path / "bad.yaml"
-    bad.write_text("height: [1, 2]\n")
-    with opened(server[0]) as page:
-        page.set_input_files("#file-curve", str(bad))
-        page.wait_for_selector("#toast.bad")
-        assert "bad.yaml: expected the keys name" in page.inner_text("#toast")

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import mujoco
 import numpy as np
 import pytest
 from edit_samples import SECONDS, make_curve, make_ground_simulator
@@ -105,3 +106,28 @@ def test_on_irregular_ground_the_place_chooses_the_start(tiny, tmp_path, monkeyp
     assert around is not None
     assert np.ptp(around["heights"]) > 0.05
     assert len(around["heights"]) == around["points"] ** 2
+    below = motion.frames.links[0, 0, :2] + np.random.default_rng(0).uniform(-5, 5, (200, 2))
+    drawn = [drawn_height(around, *xy) for xy in below]
+    np.testing.assert_allclose(drawn, ray_heights(simulator.character.model, below), atol=0.001)
+
+
+def drawn_height(ground, x: float, y: float) -> float:
+    """Height (m) of the triangles that page/ground.js makes of the message."""
+    column, u = divmod((x - ground["origin"][0]) / ground["step"], 1.0)
+    row, v = divmod((y - ground["origin"][1]) / ground["step"], 1.0)
+    heights = np.reshape(ground["heights"], (ground["points"], ground["points"]))
+    (low, right), (up, far) = heights[int(row) : int(row) + 2, int(column) : int(column) + 2]
+    if v <= u:
+        return low + u * (right - low) + v * (far - right)
+    return low + v * (up - low) + u * (far - up)
+
+
+def ray_heights(model: mujoco.MjModel, places: np.ndarray) -> np.ndarray:
+    """Height (m) of MuJoCo's ground below places [N, 2], by rays from above."""
+    data = mujoco.MjData(model)
+    data.qpos[2] = 100.0  # the body is out of the way
+    mujoco.mj_forward(model, data)
+    down, hit = np.array([0.0, 0.0, -1.0]), np.zeros(1, np.int32)
+    starts = [np.array([*xy, 20.0]) for xy in places]
+    rays = [mujoco.mj_ray(model, data, start, down, None, 1, -1, hit) for start in starts]
+    return 20.0 - np.array(rays)

@@ -20,6 +20,7 @@ export class Player {
   toggle(playing = !this.playing) {
     if (playing && this.time >= this.model.span() - 1e-3) this.time = 0;
     this.playing = playing;
+    this.shown = null; // the clock says where exactly it stopped
     this.elements.play.textContent = playing ? "❚❚" : "▶";
   }
 

@@ -77,6 +77,7 @@ export class Store extends EventTarget {
     this.variants.splice(index, 1);
     this.active = Math.min(this.active, this.variants.length - 1);
     this.commit();
+    this.changed("show"); // the motion of the one that is now active may be there already
   }
 
   show(index) {

@@ -47,10 +47,13 @@ export class Strip {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (!motion?.count || !width) return;
     const work = ++this.work;
-    let pose = 0;
+    let pose = 0, last = performance.now();
     const step = () => {
       if (work !== this.work) return;
-      if (may() && !this.fence.waiting) {
+      // a view that always draws must not keep the strip from its turn
+      const turn = may() || performance.now() - last > PATIENCE_MS;
+      if (turn && !this.fence.waiting) {
+        last = performance.now();
         if (pose === 0) this.begin(width, height);
         this.add(motion, azimuth, pose++);
         this.fence.set();

@@ -1,0 +1,82 @@
+"""Files that the page writes and reads, in headless Chromium, with the shipped policy."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+from browser import BROWSER, HEIGHT, drag, edited, opened, saved, shot, value
+
+from getup_jax import cli
+from getup_jax.motion.bvh import read_bvh
+from getup_jax.motion.curve_file import read_curve_file
+from getup_jax.motion.skeleton import forward, scaled
+
+MILLIMETRE = 0.001
+
+pytestmark = BROWSER
+
+
+def test_what_is_saved_opens_again_and_evaluates_the_same(page_server, tmp_path):
+    with opened(page_server[0], accept_downloads=True) as page:
+        page.fill("#name", "my_rise")
+        edited(page, lambda: drag(page, HEIGHT, 5, -25))
+        file = saved(page, "#save", tmp_path)
+        scores, moved = page.inner_text("#scores"), value(page, HEIGHT, 5)
+        verdict = page.inner_text("#verdict")
+        page.evaluate("sessionStorage.clear()")
+        page.reload()
+        page.wait_for_selector("body[data-shown]", timeout=60_000)
+        assert value(page, HEIGHT, 5) != moved
+        edited(page, lambda: page.set_input_files("#file-curve", str(file)))
+        assert value(page, HEIGHT, 5) == moved
+        assert page.inner_text("#scores") == scores
+    assert read_curve_file(file).values[5, 0] == moved
+    out = tmp_path / "out.json"
+    assert cli.eval_main(["--curves", str(file), "--json", str(out)]) == 0
+    found = json.loads(out.read_text())
+    assert found["success"] == float(verdict.startswith("Stands"))
+    assert f"height error {found['height_error_m']:.3f} m" in scores
+    assert f"angle error {np.degrees(found['angle_error_rad']):.1f}°" in scores
+    assert f"return rate {found['return_rate']:.2f}" in scores
+    assert f"energy {found['energy_j']:.0f} J" in scores
+    assert f"jitter {found['jitter']:.0f} rad/s³" in scores
+
+
+def test_exports_hold_the_motion_that_is_shown(page_server, tmp_path):
+    with opened(page_server[0], accept_downloads=True) as page:
+        edited(page, lambda: drag(page, HEIGHT, 4, -20))
+        files = {kind: saved(page, kind, tmp_path) for kind in ("bvh", "npz", "csv")}
+    recording = scaled(read_bvh(files["bvh"]), 0.01)
+    with np.load(files["npz"]) as data:
+        links = data["link_position"]
+        names = [str(name) for name in data["links"]]
+    position, _ = forward(recording)
+    order = [recording.joint(name) for name in names]
+    assert np.abs(position[:, order] - links).max() < MILLIMETRE
+    assert len(files["csv"].read_text().splitlines()) == recording.num_frames + 1
+
+
+def test_a_motion_file_gives_its_curve_and_start_pose(page_server, tmp_path):
+    with opened(page_server[0], accept_downloads=True) as page:
+        assert page.inner_text("#verdict").startswith("Stands")
+        file = saved(page, "bvh", tmp_path)
+        edited(page, lambda: page.set_input_files("#file-motion", str(file)))
+        assert file.name in page.inner_text("#toast")
+        name = page.input_value("#name")
+        assert name in page.inner_text("#curve optgroup[label=imported]")
+        assert page.input_value("#start") == name
+        assert value(page, HEIGHT, 8) > 1.2
+        assert "starts" not in page.inner_text("#scores"), "the pose does not fit its own curve"
+        page.wait_for_timeout(2000)
+        shot(page, "imported")
+        assert read_curve_file(saved(page, "#save", tmp_path)).pose is not None
+
+
+def test_a_file_that_is_no_curve_file_is_refused_with_a_reason(page_server, tmp_path):
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("height: [1, 2]\n")
+    with opened(page_server[0]) as page:
+        page.set_input_files("#file-curve", str(bad))
+        page.wait_for_selector("#toast.bad")
+        assert "bad.yaml: expected the keys name" in page.inner_text("#toast")
