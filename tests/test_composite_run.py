@@ -10,8 +10,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from getup_jax.cli import eval_main, train_main
+from getup_jax.composite.episodes import CompositeEpisodes
+from getup_jax.composite.evaluate import score_composite
 from getup_jax.config import ConfigError
-from getup_jax.evaluate_composite import CompositeEpisodes, score_composite
 from getup_jax.metrics import read_metrics
 from getup_jax.settings import load_config
 from getup_jax.tasks.build_composite import build_composite
@@ -103,6 +104,7 @@ def test_a_character_that_plays_the_clips_has_no_error():
     scores = score_composite(task, episodes)
     for error in scores["imitation_error_m"].values():
         assert_allclose(error["mean"], 0.0, atol=1e-5)
+        assert_allclose(error["travel"], 1.0, atol=0.05)
     still = CompositeEpisodes(
         np.repeat(position[None, :1], frames, axis=1),
         np.repeat(quaternion[None, :1], frames, axis=1),
@@ -112,6 +114,7 @@ def test_a_character_that_plays_the_clips_has_no_error():
     )
     worse = score_composite(task, still)
     assert worse["imitation_error_m"]["lower"]["mean"] > 0.05
+    assert worse["imitation_error_m"]["lower"]["travel"] == 0.0
     assert worse["fall_share"] == 1.0
 
 

@@ -22,7 +22,7 @@ LAYERS = [
     ["algo"],
     ["loop", "train"],
     ["conditions", "naturalness", "episodes", "scores", "score_table", "video", "eval_plot"],
-    ["evaluate_composite"],
+    ["composite"],
     ["evaluate", "model_card", "export", "search"],
     ["eval_options"],
     ["cli", "editor"],

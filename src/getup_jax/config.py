@@ -210,11 +210,14 @@ class NetworkConfig:
     gru_size: int = 256  # GRU in front of both, where the task observes a history of frames
     # first std of actions that the actor gives for each state; None: ppo.action_std for all
     initial_std: float | None = None
+    std_range: float = 2.0  # how far the actor may move it either way, in e-folds
 
     def __post_init__(self) -> None:
         _require(self.gru_size > 0, "network.gru_size", "more than 0", self.gru_size)
         std = self.initial_std
         _require(std is None or std > 0, "network.initial_std", "more than 0, or null", std)
+        ok = self.std_range >= 0
+        _require(ok, "network.std_range", "at least 0", self.std_range)
         names = ("relu", "tanh", "elu", "silu", "relu6")
         ok = self.activation in names
         _require(ok, "network.activation", f"one of {names}", self.activation)
@@ -284,13 +287,36 @@ class DiscriminatorConfig:
     hidden_sizes: tuple[int, ...] = (256, 128)
     heads: int = 32  # N of equation 2
     gradient_penalty: float = 10.0  # lambda of equation 2
+    # whose gradient is held at 1: sum, that of all heads together, as in the authors' release: the
+    # mean of N heads then changes by at most 1 / N a unit of distance | head, each, as equation 2
+    penalty_of: str = "sum"
     learning_rate: float = 1e-5
     minibatch_size: int = 256
+    share: float = 1.0  # of a rollout's windows that an update learns from, drawn at random
+    # features (m, and numbers of quaternions) that vary by less are not blown up to a std of 1:
+    # clips hold many links still, and any noise of the actions would tell the two kinds apart
+    least_std: float = 0.0
+    # windows of earlier rollouts that are kept, and make up half of the simulated ones; 0: none
+    memory: int = 0
 
     def __post_init__(self) -> None:
+        ok = 0 < self.share <= 1
+        _require(ok, "composite.discriminator.share", "more than 0, at most 1", self.share)
+        _require(
+            self.memory >= 0,
+            "composite.discriminator.memory",
+            "0, or a number of windows",
+            self.memory,
+        )
+        ok = self.least_std >= 0
+        _require(ok, "composite.discriminator.least_std", "at least 0", self.least_std)
         for name in ("gru_size", "heads", "learning_rate", "minibatch_size"):
             value = getattr(self, name)
             _require(value > 0, f"composite.discriminator.{name}", "more than 0", value)
+        kinds = ("sum", "head")
+        ok = self.penalty_of in kinds
+        key = "composite.discriminator.penalty_of"
+        _require(ok, key, f"one of {kinds}", self.penalty_of)
         ok = self.gradient_penalty >= 0
         key = "composite.discriminator.gradient_penalty"
         _require(ok, key, "at least 0", self.gradient_penalty)
@@ -298,8 +324,16 @@ class DiscriminatorConfig:
 
 @dataclasses.dataclass(frozen=True)
 class CompositeConfig:
-    """Composite motion: a critic for each group and goal [C]. It replaces the get-up task."""
+    """Several objectives, each with a critic of its own [C].
 
+    With `task: composite` it replaces the get-up task by composite motion; with `task: getup` the
+    reward terms of getting up, and discriminators for its style, are the objectives.
+    """
+
+    task: str = "composite"  # composite | getup
+    # getup: reward terms that are objectives: total (all of them multiplied), task, height,
+    # orientation, velocity, posture, natural
+    terms: tuple[str, ...] = ("total",)
     groups: dict[str, GroupConfig] = field(default_factory=dict)
     shared_links: tuple[str, ...] = ()  # links that several groups may have
     free_links: tuple[str, ...] = ()  # links that need not be in any group
@@ -310,24 +344,52 @@ class CompositeConfig:
     discriminator: DiscriminatorConfig = field(default_factory=DiscriminatorConfig)
     meta: str | None = None  # a composite policy whose actions this one weights and adds to [C 5]
     start_group: str | None = None  # episodes start along its clips; None: the last group's
+    start_mixed: bool = False  # and with the other groups' hinges from their own clips
     episode_s: float = 10.0
+    # training episodes are cut at random, on average after this long: more samples near the clips,
+    # where an episode starts and a policy learns to go on with a motion; None: only at episode_s
+    cut_s: float | None = None
     end_reward: float = -1.0  # of every objective in the step that ends an episode early
     fall_height_m: float = 0.15  # a joint centre below it, but for the feet's, is a fall
-    action_scale: float = 1.0  # of a hinge's whole range, moved by an action of 1
+    action_scale: float = 1.0  # times the range below, moved by an action of 1
+    # range: of a hinge, its whole range | clips: as much as the clips move it, and a little more
+    action_range: str = "range"
     # pose of action 0; clips: of each hinge the mean over its group's clips | neutral
     action_centre: str = "clips"
 
     def __post_init__(self) -> None:
-        _require(bool(self.groups), "composite.groups", "at least one group", self.groups)
+        tasks = ("composite", "getup")
+        _require(self.task in tasks, "composite.task", f"one of {tasks}", self.task)
+        if self.task == "getup":
+            self._check_getup()
+        else:
+            _require(bool(self.groups), "composite.groups", "at least one group", self.groups)
         _require(self.episode_s > 0, "composite.episode_s", "more than 0", self.episode_s)
         _require(self.action_scale > 0, "composite.action_scale", "more than 0", self.action_scale)
+        _require(
+            self.cut_s is None or self.cut_s > 0,
+            "composite.cut_s",
+            "more than 0, or null",
+            self.cut_s,
+        )
         centres, centre = ("clips", "neutral"), self.action_centre
         ok = centre in centres
         _require(ok, "composite.action_centre", f"one of {centres}", centre)
+        ranges = ("range", "clips")
+        ok = self.action_range in ranges
+        _require(ok, "composite.action_range", f"one of {ranges}", self.action_range)
         start = self.start_group
         names = tuple(self.groups)
         ok = start is None or start in names
         _require(ok, "composite.start_group", f"one of {names}, or null", start)
+
+    def _check_getup(self) -> None:
+        known = ("total", "task", "height", "orientation", "velocity", "posture", "natural")
+        ok = set(self.terms) <= set(known) and len(set(self.terms)) == len(self.terms) > 0
+        _require(ok, "composite.terms", f"some of {known}", self.terms)
+        for name, empty in (("goals", {}), ("meta", None)):
+            value = getattr(self, name)
+            _require(value == empty, f"composite.{name}", "none while getting up", value)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -362,12 +424,19 @@ class Config:
     ppo: PPOConfig = field(default_factory=PPOConfig)
     train: TrainConfig = field(default_factory=TrainConfig)
 
+    @property
+    def composite_motion(self) -> bool:
+        """Whether the task is composite motion; False: getting up."""
+        return self.composite is not None and self.composite.task == "composite"
+
     def __post_init__(self) -> None:
-        if self.composite is None:
+        if self.composite is None or not self.composite.groups:
             return
-        flat = "null with composite motion, which is on a plane"
-        _require(self.terrain is None, "terrain", flat, self.terrain)
+        flat = "null with composite motion or discriminators, which are on a plane"
+        ok = self.terrain is None or not self.composite.groups
+        _require(ok, "terrain", flat, self.terrain)
         batch = self.ppo.num_envs * self.ppo.num_steps
         size = self.composite.discriminator.minibatch_size
-        expected = f"a divisor of ppo.num_envs * ppo.num_steps = {batch}"
-        _require(batch % size == 0, "composite.discriminator.minibatch_size", expected, size)
+        seen = round(batch * self.composite.discriminator.share)
+        expected = f"a divisor of ppo.num_envs * ppo.num_steps = {batch}, times share = {seen}"
+        _require(seen % size == 0, "composite.discriminator.minibatch_size", expected, size)

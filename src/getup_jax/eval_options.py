@@ -49,6 +49,13 @@ def eval_parser() -> argparse.ArgumentParser:
         metavar="S",
         help="another irregular ground of the same kind (default: that of the training)",
     )
+    add(
+        "--script",
+        type=Path,
+        metavar="FILE",
+        help="composite motion: steer one character by the commands of a YAML file, see "
+        "docs/composite.md",
+    )
     add("--engine", metavar="E", help="native, mjx or mjx-warp (default: as for training)")
     _add_conditions(parser.add_argument_group("harder conditions, each off by default"))
     _add_outputs(parser.add_argument_group("output files"))
@@ -120,7 +127,8 @@ def _add_outputs(group: argparse._ArgumentGroup) -> None:
         "--plot",
         type=output(".png", ".pdf", ".svg"),
         metavar="FILE",
-        help="target and achieved curves of several styles, with pictures; .png, .pdf or .svg",
+        help="target and achieved curves of several styles, with pictures; of composite motion "
+        "the weights of a meta policy by body part; .png, .pdf or .svg",
     )
 
 

@@ -17,10 +17,10 @@ from getup_jax import checkpoint, eval_plot, video
 from getup_jax.algo.learner import Learner, make_learner
 from getup_jax.algo.state import PolicyState
 from getup_jax.checkpoint import LoadedPolicy
+from getup_jax.composite.evaluate import evaluate_composite
 from getup_jax.conditions import Conditions, blended, drawn, make_plan
 from getup_jax.config import Config, ConfigError, TaskConfig, TerrainConfig
 from getup_jax.episodes import Episodes, run_episodes
-from getup_jax.evaluate_composite import evaluate_composite
 from getup_jax.motion.clips import GetUp
 from getup_jax.motion.curve_file import read_curve_file
 from getup_jax.nets import prior as pose_prior
@@ -47,8 +47,10 @@ def evaluate_command(args: argparse.Namespace) -> int:
     if args.plot is not None:
         eval_plot.require()
     loaded = checkpoint.load_policy(args.ckpt)
-    if loaded.config.composite is not None:
+    if loaded.config.composite_motion:
         return evaluate_composite(args, loaded)
+    if args.script is not None:
+        raise ConfigError("--script: only for policies of composite motion")
     conditions = Conditions.of(args)
     config = evaluation_config(loaded.config, args)
     conditions.check(config)

@@ -20,6 +20,7 @@ from getup_jax.runfolder import prepare, resume_command
 from getup_jax.stop import StopRequest
 from getup_jax.tasks.build import build_task
 from getup_jax.tasks.build_composite import BuiltComposite, build_composite
+from getup_jax.tasks.styled import with_objectives
 
 __all__ = ["Job", "TrainingError", "build_job", "run"]
 
@@ -28,11 +29,18 @@ Log = Callable[[str], None]
 
 def build_job(config: Config, log: Log) -> Job:
     """The task and the learner that the settings ask for."""
-    if config.composite is not None:
+    if config.composite_motion:
         return build_composite_job(config, log)[1]
-    task = build_task(config, log)
+    task, objectives = build_task(config, log), None
+    if config.composite is not None:
+        task = styled = with_objectives(config, task, log)
+        objectives = make_objectives(styled.environment, config.composite)
     learner = make_learner(
-        task.environment, config.network, config.ppo, total_steps=config.train.total_steps
+        task.environment,
+        config.network,
+        config.ppo,
+        total_steps=config.train.total_steps,
+        objectives=objectives,
     )
     return Job(learner=learner, world=task.world, prior=task.prior)
 

@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from getup_jax.algo import normalize
 from getup_jax.algo.discriminator import (
     Discriminator,
     Pairs,
@@ -44,16 +47,21 @@ def test_penalty_of_a_linear_ensemble():
         fake=jnp.asarray(rng.normal(size=(7, F, D)), jnp.float32),
         real=jnp.asarray(rng.normal(size=(7, F, D)), jnp.float32),
         share=jnp.linspace(0.0, 1.0, 7),
+        head=jnp.asarray([0, 1, 0, 1, 0, 1, 0], jnp.int32),
     )
     found = gradient_penalty(lambda x: x.reshape(len(x), -1) @ heads, pairs)
     norm = np.linalg.norm(np.asarray(heads, np.float64).sum(axis=1))
     assert_allclose(found, (norm - 1.0) ** 2, rtol=1e-5)
+    # of each head: four mixtures are judged by the first, three by the second
+    found = gradient_penalty(lambda x: x.reshape(len(x), -1) @ heads, pairs, each=True)
+    first, second = (np.linalg.norm(np.asarray(heads, np.float64), axis=0) - 1.0) ** 2
+    assert_allclose(found, (4 * first + 3 * second) / 7, rtol=1e-5)
 
 
 def test_penalty_is_taken_between_the_windows():
     """Of |x|^2 / 2 the gradient is x itself, so the penalty tells where it was taken."""
     fake, real = jnp.full((1, F, D), 2.0), jnp.zeros((1, F, D))
-    pairs = Pairs(fake, real, jnp.asarray([0.25]))
+    pairs = Pairs(fake, real, jnp.asarray([0.25]), jnp.zeros(1, jnp.int32))
     found = gradient_penalty(lambda x: 0.5 * jnp.sum(x**2, axis=(1, 2))[:, None], pairs)
     assert_allclose(found, (0.5 * np.sqrt(F * D) - 1.0) ** 2, rtol=1e-5)
 
@@ -88,3 +96,21 @@ def test_statistics_are_those_of_both_kinds(trained):
     # two kinds 4 apart with a spread of 2: 2^2 + 2^2
     assert_allclose(state.statistics.variance, 8.0, rtol=0.05)
     assert float(state.statistics.count) == 30 * 2 * N * F
+
+
+def test_memory_is_half_of_what_is_learned_from_and_is_renewed_slowly():
+    config = dataclasses.replace(CONFIG, memory=200)
+    model = Discriminator(config)
+    state = model.init(jax.random.key(0), F, D)
+    assert state.memory.shape == (200, F, D)
+    ones = jnp.ones((N, F, D))
+    seen, memory = model._remember(state, ones, jax.random.key(1))
+    assert_allclose(seen, 1.0)
+    assert_allclose(memory, 1.0)  # the first windows fill it
+    known = normalize.update(state.statistics, ones.reshape(-1, D))
+    state = dataclasses.replace(state, memory=memory, statistics=known)
+    seen, memory = model._remember(state, 2.0 * ones, jax.random.key(2))
+    assert sorted(np.unique(seen)) == [1.0, 2.0]
+    assert_allclose(np.mean(seen), 1.5)
+    assert_allclose(np.mean(memory), 1.01, atol=1e-3)  # 2 of 200
+    assert Discriminator(CONFIG).init(jax.random.key(0), F, D).memory is None

@@ -48,6 +48,16 @@ def test_the_mean_is_equation_10():
     assert_allclose(gradient[:, 2:], 0.0)
 
 
+def test_the_std_stays_in_its_range():
+    network = NetworkConfig(hidden_sizes=(), initial_std=0.1, std_range=0.5)
+    model = make_actor_critic(Probe(), network)
+    actor = jax.jit(model.actor.init)(jax.random.key(0), jnp.zeros(2))
+    seen = jnp.asarray([[1e4, 0.0], [-1e4, 0.0], [0.0, 0.0]])
+    _, std = model.distribution(actor, seen, jnp.zeros(()))
+    low, high = 0.1 * np.exp(-0.5), 0.1 * np.exp(0.5)
+    assert_allclose(np.sort(np.asarray(std)[:, 0]), [low, 0.1, high], rtol=1e-5)
+
+
 def test_statistics_leave_the_meta_action_as_it_is():
     model = make_actor_critic(MetaProbe(), NetworkConfig(hidden_sizes=(4,)))
     policy = jax.jit(lambda key: model.init(key, CONFIG.ppo).policy)(jax.random.key(0))

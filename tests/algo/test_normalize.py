@@ -86,3 +86,9 @@ def test_constant_observation_gives_zero():
     x = jnp.full((64, 3), 0.1)
     moments = normalize.update(normalize.initial(3), x)
     np.testing.assert_allclose(normalize.normalize(moments, x), 0.0, atol=1e-3)
+
+
+def test_a_least_std_keeps_small_variations_small():
+    moments = normalize.moments_of(jnp.asarray([[0.0, -0.01], [4.0, 0.01]]), jnp.zeros(2))
+    found = normalize.normalize(moments, jnp.asarray([[4.0, 0.01]]), least_std=0.1)
+    np.testing.assert_allclose(found, [[1.0, 0.1]], rtol=1e-3)

@@ -128,3 +128,14 @@ def test_one_critic_gets_the_weighted_sum(judged):
     rewards = np.asarray(after.reward)
     found = summed._merged(after.reward)
     assert_allclose(found[..., 0], 0.25 * rewards[..., 0] + 0.75 * rewards[..., 1], atol=1e-6)
+
+
+def test_a_share_of_the_windows_is_drawn_without_repeats(judged):
+    objectives, _, _ = judged
+    half = dataclasses.replace(COMPOSITE.discriminator, share=0.5)
+    some = dataclasses.replace(objectives, discriminator=Discriminator(half))
+    windows = jnp.arange(32.0)[:, None, None]
+    found = np.asarray(some._some(windows, jax.random.key(0))).ravel()
+    assert len(set(found)) == 16
+    assert set(found) != set(range(16))
+    assert objectives._some(windows, jax.random.key(0)) is windows

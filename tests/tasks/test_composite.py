@@ -12,8 +12,14 @@ from tiny_composite import CONFIG, clips, tiny_composite
 
 from getup_jax.config import ConfigError
 from getup_jax.physics.character import load_character
-from getup_jax.tasks.build_composite import action_centre, assemble_composite, resampled
+from getup_jax.tasks.build_composite import (
+    action_centre,
+    action_scale,
+    assemble_composite,
+    resampled,
+)
 from getup_jax.tasks.composite import FRAMES, LINK_STATE, observe
+from getup_jax.tasks.reference_windows import window_at
 
 SIZE = 16
 
@@ -180,3 +186,43 @@ def test_a_goals_mistake_names_its_key(character):
     composite = dataclasses.replace(CONFIG.composite, goals={"target_locaton": {}})
     with pytest.raises(ConfigError, match=r"composite\.goals: .*target_location"):
         tiny_composite(character, dataclasses.replace(CONFIG, composite=composite))
+
+
+def test_cuts_end_a_share_of_the_episodes_and_no_failed_one(built, steps):
+    """On average after 2 dt: half of those that go on, drawn anew for each key."""
+    _, _, outputs = steps
+    env = built.environment
+    cut = dataclasses.replace(env, config=dataclasses.replace(env.config, cut_s=2 / 30))
+    many = outputs[0].replace(terminated=jnp.arange(4000) < 1000, truncated=jnp.zeros(4000, bool))
+    found = cut._cut(many, jax.random.key(0))
+    assert not np.any(found.truncated[:1000])
+    assert_allclose(np.mean(found.truncated[1000:]), 0.5, atol=0.03)
+    assert env._cut(many, jax.random.key(0)) is many
+
+
+def test_actions_move_a_hinge_as_much_as_its_clips_do(character):
+    config = dataclasses.replace(CONFIG.composite, action_range="clips", action_scale=0.5)
+    found = action_scale(config, character, clips(character))
+    knee = clips(character)["lower"][0].qpos[:, 7 + character.joint("shin_l_flex")]
+    assert_allclose(found[character.joint("shin_l_flex")], 0.5 * (0.6 + 4 * knee.std()))
+    # still in its own group's clip; that it moves in the other's does not count
+    assert_allclose(found[character.joint("arm_l_flex")], 0.3)
+    full = character.joint_upper - character.joint_lower
+    assert np.all(found <= 0.5 * full + 1e-9)
+    whole = action_scale(CONFIG.composite, character, clips(character))
+    assert_allclose(whole, full)
+
+
+def test_mixed_starts_look_like_the_clips_of_every_group(character):
+    """In windows too; without, the arms start where the clip of the legs has them."""
+    composite = dataclasses.replace(CONFIG.composite, start_mixed=True)
+    mixed = tiny_composite(character, dataclasses.replace(CONFIG, composite=composite))
+    for built, same in ((mixed, True), (tiny_composite(character), False)):
+        env, references = built.environment, built.world.references
+        window = env.windows(built.world.starts.history)
+        upper = env.groups[0]
+        time = jnp.arange(0.0, 1.5, 1 / 60)
+        none = jnp.zeros(len(time), jnp.int32)
+        clip = window_at(references["upper"], upper, none, time, jnp.full(len(time), 1 / 30))
+        gap = jnp.abs(clip[None] - window["upper"][:, None]).max(axis=(2, 3)).min(axis=1)
+        assert bool(jnp.max(gap) < 1e-5) is same

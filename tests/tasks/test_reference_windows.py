@@ -19,6 +19,7 @@ from getup_jax.tasks.reference_windows import (
     make_references,
     nearest,
     sample,
+    travel,
     unrolled,
     window_at,
 )
@@ -103,6 +104,22 @@ def test_a_pose_of_the_clips_is_at_distance_zero(character, upper, references):
     away = np.array(window).reshape(*window.shape[:-1], -1, 7)
     away[..., 0] += 0.3
     assert 0.05 < float(gap(away.reshape(window.shape))[0]) <= 0.3 + 1e-5
+
+
+def test_travel_is_0_at_rest_and_the_mean_of_the_clips_for_them(character, upper):
+    """A root that is carried along x at 1 m/s, seen in the heading frame: each link goes 4 dt."""
+    group = dataclasses.replace(upper, frame="heading")
+    qpos = np.tile(character.neutral_qpos, (61, 1))
+    still = make_references([Clip("still", 30.0, qpos)], group, character, DT)
+    qpos = qpos.copy()
+    qpos[:, 0] = np.arange(61) * DT
+    moving = make_references([Clip("moving", 30.0, qpos)], group, character, DT)
+    assert_allclose(still.travel, 0.0, atol=1e-6)
+    # the pace of the windows is drawn from .8 to 1.2
+    assert_allclose(moving.travel, 4 * DT, rtol=0.02)
+    row = jnp.zeros(1, jnp.int32)
+    window = window_at(moving, group, row, jnp.zeros(1), jnp.full(1, DT))
+    assert_allclose(travel(group, window), 4 * DT, rtol=1e-4)
 
 
 def test_a_loop_goes_on_from_where_it_ended(character):

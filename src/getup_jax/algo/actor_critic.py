@@ -21,9 +21,6 @@ from getup_jax.types import Environment
 # Gain of the actor's last kernel: the first actions are noise around zero.
 ACTOR_OUTPUT_SCALE = 0.01
 
-# Bounds of the log std that an actor gives, in e-folds around the first one.
-LOG_STD_RANGE = 2.0
-
 # Logit of the first weight of a meta policy's action: 0.88, so that learning starts near it.
 META_LOGIT = 2.0
 
@@ -38,6 +35,7 @@ class ActorCritic:
     critic: Network  # to K outputs
     observation_size: int  # O
     initial_std: float | None = None  # None: the std is a setting, not the actor's
+    std_range: float = 2.0  # bounds of the actor's log std, in e-folds around the first one
     # A where the observation ends in a meta policy's action, which only the mean gets, else 0
     meta_size: int = 0
 
@@ -75,7 +73,7 @@ class ActorCritic:
             mean = mean + weight * jax.lax.stop_gradient(normalized[..., self.observation_size :])
         if self.initial_std is None or log_std is None:
             return mean, std
-        log_std = jnp.clip(log_std, -LOG_STD_RANGE, LOG_STD_RANGE) + math.log(self.initial_std)
+        log_std = jnp.clip(log_std, -self.std_range, self.std_range) + math.log(self.initial_std)
         return mean, jnp.exp(log_std)
 
     def meta_weight(self, actor: Any, normalized: jax.Array) -> jax.Array | None:
@@ -112,6 +110,7 @@ def make_actor_critic(env: Environment, config: NetworkConfig) -> ActorCritic:
         critic=_network(env, config, env.num_objectives, 1.0),
         observation_size=env.observation_size - meta_size,
         initial_std=config.initial_std,
+        std_range=config.std_range,
         meta_size=meta_size,
     )
 

@@ -9,6 +9,7 @@ without a field of their own. A meta policy may have one itself: the chain's dee
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -116,6 +117,21 @@ class MetaTask:
     def kinematics(self, state: MetaState) -> Kinematics:
         """What can be seen of the simulations."""
         return self.task.kinematics(state.task)
+
+    def adopt(
+        self, world: MetaWorld, state: CompositeState, goals: Any, key: jax.Array
+    ) -> MetaState:
+        """See `CompositeTask.adopt`."""
+        task = self.task.adopt(world.task, state, goals, key)
+        return MetaState(task, self._join(world, task.observation, key), key)
+
+    def task_state(self, state: MetaState) -> CompositeState:
+        """The episode as a task without a meta policy has it."""
+        return state.task
+
+    def goal_states(self, state: MetaState) -> Any:
+        """See `CompositeTask.goal_states`."""
+        return self.task.goal_states(state.task)
 
     def success(self, state: MetaState) -> dict[str, jax.Array]:
         """See `CompositeTask.success`."""

@@ -15,7 +15,12 @@ from getup_jax.algo.state import PolicyState
 from getup_jax.checkpoint import LoadedPolicy, load_policy
 from getup_jax.config import CompositeConfig, Config, ConfigError
 from getup_jax.storage import from_nested
-from getup_jax.tasks.build_composite import BuiltComposite, action_centre, load_clips
+from getup_jax.tasks.build_composite import (
+    BuiltComposite,
+    action_centre,
+    action_scale,
+    load_clips,
+)
 from getup_jax.tasks.composite import CompositeTask
 from getup_jax.tasks.goals.combine import make_goals
 from getup_jax.tasks.groups import resolve_groups
@@ -58,7 +63,7 @@ def _load_chain(config: Config, task: CompositeTask) -> list[LoadedPolicy]:
 
 def _check(loaded: LoadedPolicy, config: Config, task: CompositeTask, path: str) -> None:
     composite, key = loaded.config.composite, f"composite.meta: {path}"
-    if composite is None:
+    if composite is None or not loaded.config.composite_motion:
         raise ConfigError(
             f"{key}: is a policy of the get-up task; expected one of composite motion"
         )
@@ -113,8 +118,8 @@ def _actions(
     """Hinge angles [A] of a policy's action 0, and rad [A] of its action 1."""
     composite, character = _composite(config), task.character
     clips = load_clips(composite, character) if built is None else built.clips
-    scale = composite.action_scale * (character.joint_upper - character.joint_lower)
-    return action_centre(composite, character, clips), scale
+    centre = action_centre(composite, character, clips)
+    return centre, action_scale(composite, character, clips)
 
 
 def _composite(config: Config) -> CompositeConfig:

@@ -84,7 +84,11 @@ def update(moments: Moments, x: jax.Array) -> Moments:
     return merge(moments, moments_of(x, moments.mean))
 
 
-def normalize(moments: Moments, x: jax.Array) -> jax.Array:
-    """(x - mean) / sqrt(variance + EPSILON), clipped to +-CLIP, for x[..., O]."""
-    z = (x - moments.mean) * jax.lax.rsqrt(moments.variance + EPSILON)
+def normalize(moments: Moments, x: jax.Array, least_std: float = 0.0) -> jax.Array:
+    """(x - mean) / sqrt(variance + EPSILON), clipped to +-CLIP, for x[..., O].
+
+    Variances count as at least that of `least_std`.
+    """
+    variance = jnp.maximum(moments.variance, least_std**2) if least_std else moments.variance
+    z = (x - moments.mean) * jax.lax.rsqrt(variance + EPSILON)
     return jnp.clip(z, -CLIP, CLIP)

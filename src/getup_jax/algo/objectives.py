@@ -14,6 +14,9 @@ from getup_jax.config import CompositeConfig
 from getup_jax.tasks.composite import CompositeTask
 from getup_jax.tasks.groups import Group, objective_weights
 from getup_jax.tasks.reference_windows import sample
+from getup_jax.tasks.styled import StyledGetUp
+
+_DRAWN = 2  # folded into a key, so that runs that use all windows draw what they did
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,9 +56,10 @@ class Objectives:
         """
         rewards, trained, metrics = transition.reward, {}, {}
         for index, group in enumerate(self.groups):
-            key_sample, key_update = jax.random.split(jax.random.fold_in(key, index))
+            key_group = jax.random.fold_in(key, index)
+            key_sample, key_update = jax.random.split(key_group)
             windows = transition.extras[group.name]
-            fake = windows.reshape(-1, *windows.shape[2:])
+            fake = self._some(windows.reshape(-1, *windows.shape[2:]), key_group)
             references = world.references[group.name]
             real = sample(references, group, key_sample, len(fake), self.control_dt)
             state, found = self.discriminator.update(states[group.name], fake, real, key_update)
@@ -68,6 +72,14 @@ class Objectives:
             metrics[f"rollout/reward_{name}"] = jnp.mean(rewards[..., index])
         return trained, dataclasses.replace(transition, reward=self._merged(rewards)), metrics
 
+    def _some(self, windows: jax.Array, key: jax.Array) -> jax.Array:
+        """The share of the windows [N, F, D] that an update learns from."""
+        share = self.discriminator.config.share
+        if share == 1.0:
+            return windows
+        order = jax.random.permutation(jax.random.fold_in(key, _DRAWN), len(windows))
+        return windows[order[: round(share * len(windows))]]
+
     def _merged(self, rewards: jax.Array) -> jax.Array:
         """Rewards [T, B, K] as the critics have them."""
         if self.separate:
@@ -75,8 +87,8 @@ class Objectives:
         return jnp.sum(jnp.asarray(self.weights) * rewards, axis=-1, keepdims=True)
 
 
-def make_objectives(env: CompositeTask, config: CompositeConfig) -> Objectives:
-    """The objectives of a composite task."""
+def make_objectives(env: CompositeTask | StyledGetUp, config: CompositeConfig) -> Objectives:
+    """The objectives of a composite task, or of getting up with several."""
     return Objectives(
         names=env.objectives,
         weights=objective_weights(config, env.objectives),

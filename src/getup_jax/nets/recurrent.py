@@ -26,7 +26,8 @@ class GRU(nn.Module):
         size = self.size
         inputs = nn.Dense(3 * size, name="input", kernel_init=nn.initializers.lecun_normal())(x)
         recurrent = nn.Dense(3 * size, name="recurrent", kernel_init=nn.initializers.orthogonal())
-        hidden = jnp.zeros((*x.shape[:-2], size), x.dtype)
+        # one zero state for all rows: its product with the weights is not computed for each
+        hidden = jnp.zeros(size, x.dtype)
         for frame in range(x.shape[-2]):
             now, before = inputs[..., frame, :], recurrent(hidden)
             gates = nn.sigmoid(now[..., : 2 * size] + before[..., : 2 * size])

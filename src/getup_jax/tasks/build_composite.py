@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -25,6 +25,10 @@ from getup_jax.tasks.groups import objective_weights, resolve_groups
 from getup_jax.tasks.reference_windows import make_references, unrolled
 from getup_jax.tasks.references import velocities
 from getup_jax.types import Engine, take
+
+_STILL_RAD = 0.6  # scale of a hinge that the clips do not move
+_MIXES = 8  # starts of every frame of the start group's clips
+_SPREADS = 4.0  # added to it: times the standard deviation of the clips' angles
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -68,7 +72,10 @@ def assemble_composite(
         for group in groups
     }
     start = composite.start_group or groups[-1].name
-    starts = _starts(clips[start], character, engine, config.task.pool_size)
+    moving = [resampled(unrolled(clip), 1.0 / engine.control_dt) for clip in clips[start]]
+    if composite.start_mixed:
+        moving = mixed(moving, start, composite, character, clips)
+    starts = _starts(moving, character, engine, config.task.pool_size)
     _check_starts(task, starts, f"composite.groups.{start}.clips")
     log(f"engine: {engine.name}; {len(starts.history)} start states along {start}'s clips")
     world = CompositeWorld(
@@ -83,7 +90,7 @@ def _targets(task: CompositeTask, clips: dict[str, list[Clip]], config: TaskConf
     margin = config.target_margin_rad
     values = {
         "target_centre": action_centre(task.config, task.character, clips),
-        "target_scale": task.config.action_scale * (upper - lower),
+        "target_scale": action_scale(task.config, task.character, clips),
         "target_lower": lower - margin,
         "target_upper": upper + margin,
     }
@@ -101,12 +108,43 @@ def action_centre(
     centre = character.neutral_qpos[7:].copy()
     if config.action_centre == "neutral":
         return centre
-    groups = resolve_groups(config, character)
-    for group in reversed(groups):  # of two groups with one link, the first one counts
-        own = np.isin(character.joint_link, group.links)
-        frames = np.concatenate([clip.qpos[:, 7:] for clip in clips[group.name]])
-        centre[own] = frames.mean(axis=0)[own]
+    for own, angles in _own_hinges(config, character, clips):
+        centre[own] = angles.mean(axis=0)
     return centre
+
+
+def action_scale(
+    config: CompositeConfig, character: CharacterSpec, clips: dict[str, list[Clip]]
+) -> np.ndarray:
+    """How far (rad, [J]) an action of 1 moves each hinge's target.
+
+    `range`: the hinge's whole range; its noise moves an arm that a clip holds still several times
+    as much as the clip moves anything. `clips`: as much as the clips move it, and a little more.
+    """
+    full = character.joint_upper - character.joint_lower
+    if config.action_range == "range":
+        return config.action_scale * full
+    spread = np.zeros_like(full)
+    for own, angles in _own_hinges(config, character, clips):
+        spread[own] = angles.std(axis=0)
+    return config.action_scale * np.minimum(full, _STILL_RAD + _SPREADS * spread)
+
+
+def _own_hinges(
+    config: CompositeConfig, character: CharacterSpec, clips: dict[str, list[Clip]]
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Of every group: its hinges [J] bool, and their angles [frames, hinges] in its clips."""
+    for name, own in _hinges_of(config, character):
+        frames = np.concatenate([clip.qpos[:, 7:] for clip in clips[name]])
+        yield own, frames[:, own]
+
+
+def _hinges_of(
+    config: CompositeConfig, character: CharacterSpec
+) -> Iterator[tuple[str, np.ndarray]]:
+    """Of every group: its name and its hinges [J] bool; of two with one link the first is last."""
+    for group in reversed(resolve_groups(config, character)):
+        yield group.name, np.isin(character.joint_link, group.links)
 
 
 def load_clips(config: CompositeConfig, character: CharacterSpec) -> dict[str, list[Clip]]:
@@ -117,11 +155,37 @@ def load_clips(config: CompositeConfig, character: CharacterSpec) -> dict[str, l
     }
 
 
+def mixed(
+    moving: Sequence[Clip],
+    start: str,
+    config: CompositeConfig,
+    character: CharacterSpec,
+    clips: dict[str, list[Clip]],
+) -> list[Clip]:
+    """The start group's clips, each _MIXES times with the other groups' hinges from their clips.
+
+    These begin anywhere; all are at the same rate. Otherwise an arm starts where the clip of the
+    legs has it, and episodes begin with a motion that no clip of the arm has.
+    """
+    rng = np.random.default_rng(0)
+    found = []
+    for clip in moving:
+        for _ in range(_MIXES):
+            qpos = clip.qpos.copy()
+            for name, own in _hinges_of(config, character):
+                if name != start:
+                    other = clips[name][rng.integers(len(clips[name]))]
+                    loop = resampled(other, clip.fps).qpos[:-1, 7:]
+                    row = (rng.integers(len(loop)) + np.arange(len(qpos))) % len(loop)
+                    qpos[:, 7:][:, own] = loop[row][:, own]
+            found.append(dataclasses.replace(clip, qpos=qpos))
+    return found
+
+
 def _starts(clips: Sequence[Clip], character: CharacterSpec, engine: Engine, most: int) -> Starts:
-    """Every frame of the clips (at most `most`) that has enough frames before it."""
+    """Every frame of clips at the control rate that has enough before it; at most `most`."""
     qpos, qvel, rows, count = [], [], [], 0
-    for clip in clips:
-        moving = resampled(unrolled(clip), 1.0 / engine.control_dt)
+    for moving in clips:
         qvel.append(velocities(moving, character))
         qpos.append(moving.qpos[:-1])
         rows.append(count + np.arange(FRAMES, len(qpos[-1])))

@@ -20,12 +20,13 @@ from getup_jax.rows import replace_rows
 from getup_jax.tasks.goals.combine import Goals
 from getup_jax.tasks.goals.goal import GoalOutput
 from getup_jax.tasks.groups import Group
-from getup_jax.tasks.reference_windows import References, nearest
+from getup_jax.tasks.reference_windows import References, nearest, travel
 from getup_jax.types import Engine, Kinematics, PhysicsState, StepOutput, take
 
 FRAMES = 4  # that the actor sees; a window has the next one too
 LINK_STATE = 13  # position 3, quaternion 4, linear and angular velocity 3 each
 _RESET_CHUNK = 32
+_CUT = 1  # folded into a key, so that tasks without cuts draw what they did
 
 
 @struct.dataclass
@@ -159,7 +160,16 @@ class CompositeTask:
             key=key,
             **_count(state, goal_outputs),
         )
-        return state, self._output(world, state, goal_outputs)
+        output = self._output(world, state, goal_outputs)
+        return state, self._cut(output, jax.random.fold_in(key_goals, _CUT))
+
+    def _cut(self, output: StepOutput, key: jax.Array) -> StepOutput:
+        """Ends some episodes at random, `cut_s` after their start on average."""
+        if self.config.cut_s is None:
+            return output
+        chance = self.engine.control_dt / self.config.cut_s
+        cut = jax.random.uniform(key, output.truncated.shape) < chance
+        return output.replace(truncated=output.truncated | (cut & ~output.terminated))
 
     def _output(
         self, world: CompositeWorld, state: CompositeState, goals: tuple[GoalOutput, ...]
@@ -185,7 +195,7 @@ class CompositeTask:
             reward=jnp.where(terminated[:, None], self.config.end_reward, reward),
             terminated=terminated,
             truncated=~terminated & (state.step >= last),
-            metrics=self._gaps(world, windows) | causes_seen,
+            metrics=self._likeness(world, windows) | causes_seen,
             episode={"steps": state.step.astype(jnp.float32)} | self.success(state),
             extras=windows,
         )
@@ -193,6 +203,24 @@ class CompositeTask:
     def kinematics(self, state: CompositeState) -> Kinematics:
         """What can be seen of the simulations."""
         return state.physics.kinematics
+
+    def adopt(
+        self, world: CompositeWorld, state: CompositeState, goals: Any, key: jax.Array
+    ) -> CompositeState:
+        """An episode of a task of the same character goes on in this one, with these goals."""
+        none = jnp.zeros((len(state.step), len(self.goals.names)), jnp.float32)
+        observation = self._observe(state.history, goals, state.physics)
+        return state.replace(
+            goals=goals, observation=observation, attempts=none, successes=none, key=key
+        )
+
+    def task_state(self, state: CompositeState) -> CompositeState:
+        """The episode as a task without a meta policy has it."""
+        return state
+
+    def goal_states(self, state: CompositeState) -> Any:
+        """The states of the goal tasks, in their order."""
+        return state.goals
 
     def success(self, state: CompositeState) -> dict[str, jax.Array]:
         """Share [B] of each goal's attempts so far that succeeded; NaN where none ended."""
@@ -222,14 +250,21 @@ class CompositeTask:
         height = kinematics.link_position[:, links, 2]
         return jnp.min(height, axis=-1) < self.config.fall_height_m
 
-    def _gaps(self, world: CompositeWorld, windows: dict[str, jax.Array]) -> dict[str, jax.Array]:
-        """Distance of every group to the nearest pose of its clips (m)."""
-        return {
-            f"pose_gap_{group.name}_m": nearest(
-                world.references[group.name], group, windows[group.name]
-            )
-            for group in self.groups
-        }
+    def _likeness(
+        self, world: CompositeWorld, windows: dict[str, jax.Array]
+    ) -> dict[str, jax.Array]:
+        """Of every group: distance to the nearest pose of its clips (m), and how far it moves.
+
+        The latter as a share of what the clips do. A character that stands still in one of their
+        poses has no distance, and no travel.
+        """
+        found = {}
+        for group in self.groups:
+            references, window = world.references[group.name], windows[group.name]
+            found[f"pose_gap_{group.name}_m"] = nearest(references, group, window)
+            share = travel(group, window) / jnp.maximum(references.travel, 1e-6)
+            found[f"travel_{group.name}"] = share
+        return found
 
     def _draw(self, world: CompositeWorld, key: jax.Array, num_envs: int) -> jax.Array:
         return jax.random.randint(key, (num_envs,), 0, len(world.starts.history))

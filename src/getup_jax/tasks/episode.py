@@ -61,6 +61,8 @@ class EpisodeState:
     # Irregular ground only; None on a flat plane.
     region: jax.Array | None = None  # [B] int32, where the episode started
     curriculum: Curriculum | None = None  # of the whole batch
+    # [B, F, L, 7] poses of the links, the oldest first; None: no discriminator looks at them
+    history: jax.Array | None = None
 
 
 def update_record(

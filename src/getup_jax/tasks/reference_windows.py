@@ -19,6 +19,7 @@ from getup_jax.tasks.groups import Group
 _LOOP_RAD = 0.05  # a clip whose first and last pose differ by less repeats
 _LOOP_M = 0.02
 _POSES = 256  # frames that `nearest` looks at, at most
+_WINDOWS = 1024  # that the clips' mean travel is taken over
 
 
 @struct.dataclass
@@ -31,6 +32,7 @@ class References:
     fps: jax.Array  # [C]
     duration: jax.Array  # [C] s
     poses: jax.Array  # [Q, N, 3] some frames' positions, as in the newest frame of a window
+    travel: jax.Array  # [] m, mean of `travel` over the clips' windows
 
 
 def make_references(
@@ -50,14 +52,17 @@ def make_references(
     position, quaternion = link_poses(np.concatenate([clip.qpos for clip in clips]), character)
     some = np.linspace(0, len(position) - 1, min(_POSES, len(position))).astype(int)
     pose = group.window(jnp.asarray(position[some, None]), jnp.asarray(quaternion[some, None]))
-    return References(
+    found = References(
         position=jnp.asarray(position),
         quaternion=jnp.asarray(quaternion),
         first=jnp.asarray(np.cumsum([0, *counts[:-1]]), jnp.int32),
         fps=jnp.asarray([clip.fps for clip in clips], jnp.float32),
         duration=jnp.asarray([clip.duration for clip in clips], jnp.float32),
         poses=group.positions(pose)[:, 0],
+        travel=jnp.zeros(()),
     )
+    windows = sample(found, group, jax.random.PRNGKey(0), _WINDOWS, control_dt)
+    return found.replace(travel=jnp.mean(travel(group, windows)))
 
 
 def sample(
@@ -96,6 +101,13 @@ def nearest(references: References, group: Group, window: jax.Array) -> jax.Arra
     newest = group.positions(window)[..., -1, :, :]
     gap = jnp.linalg.norm(newest[:, None] - references.poses, axis=-1)
     return jnp.min(jnp.mean(gap, axis=-1), axis=-1)
+
+
+def travel(group: Group, window: jax.Array) -> jax.Array:
+    """How far [B] (m) a link comes from a window's oldest frame to its newest, mean over links."""
+    position = group.positions(window)
+    gap = jnp.linalg.norm(position[..., -1, :, :] - position[..., 0, :, :], axis=-1)
+    return jnp.mean(gap, axis=-1)
 
 
 def unrolled(clip: Clip) -> Clip:

@@ -192,3 +192,24 @@ def test_wrong_settings_name_the_key_and_the_choices(settings, message):
     character = load_character(PhysicsConfig(character="humanoid28"))
     with pytest.raises(ConfigError, match=message):
         make_goals(settings, character, DT)
+
+
+def test_orders_are_held_past_their_time():
+    """Asked again before every step, a target neither ends nor is drawn anew."""
+    order = {"place": (1.0, 2.0), "within_s": 0.5}
+    state = LOCATION.steer(location_state(reached=True), order, 0.0)
+    assert not bool(state.reached[0])
+    np.testing.assert_allclose(state.time_left, [1.0])  # at least what it is held for
+    later, out = LOCATION_STEP(KEY, LOCATION.steer(state, order, 60.0), kinematics())
+    np.testing.assert_allclose(later.place, [[1.0, 2.0]])
+    assert np.isnan(out.success[0])
+    far = LOCATION.steer(state, {"place": (9.0, 0.0), "within_s": 6.0}, 2.0)
+    np.testing.assert_allclose(far.time_left, [4.0])
+
+
+def test_orders_of_directions():
+    heading = HEADING.steer(heading_state(), {"yaw_deg": 180.0, "speed": None}, 0.0)
+    np.testing.assert_allclose(heading.direction, [[-1.0, 0.0]], atol=1e-6)
+    np.testing.assert_allclose(heading.speed, [1.35])
+    aim = AIMING.steer(None, {"yaw_deg": 90.0, "pitch_deg": 30.0}, 0.0)
+    np.testing.assert_allclose(aim.direction, [[0.0, np.sqrt(0.75), 0.5]], atol=1e-6)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -12,6 +12,8 @@ from flax import struct
 
 from getup_jax.physics.props import Ball
 from getup_jax.tasks.goals.goal import (
+    HELD_S,
+    REQUIRED,
     GoalOutput,
     Marker,
     floor_direction,
@@ -49,6 +51,7 @@ class Aiming:
     links: ClassVar[dict[str, str]] = {"forearm": "forearm_r", "hand": "hand_r"}
     observation_size: ClassVar[int] = 3
     balls: ClassVar[tuple[Ball, ...]] = ()
+    orders: ClassVar[dict[str, tuple[int, Any]]] = {"yaw_deg": (1, REQUIRED), "pitch_deg": (1, 0.0)}
 
     def reset(self, key: jax.Array, kinematics: Kinematics) -> AimingState:
         """A direction around where the character faces."""
@@ -85,6 +88,13 @@ class Aiming:
         """An arrow from the elbow."""
         elbow = np.asarray(kinematics.link_position[self.forearm])
         return [Marker(position=elbow, reach=np.asarray(state.direction), radius=0.015)]
+
+    def steer(self, state: AimingState, order: dict[str, Any], age_s: float) -> AimingState:
+        """Point along `yaw_deg` (world, 0 along x), `pitch_deg` above the horizontal."""
+        yaw, pitch = (jnp.radians(jnp.float32(order[key])) for key in ("yaw_deg", "pitch_deg"))
+        level = jnp.cos(pitch)
+        direction = jnp.stack([level * jnp.cos(yaw), level * jnp.sin(yaw), jnp.sin(pitch)])
+        return AimingState(direction[None], jnp.full(1, HELD_S, jnp.float32))
 
 
 def aiming_reward(elbow: jax.Array, hand: jax.Array, direction: jax.Array) -> jax.Array:

@@ -97,6 +97,16 @@ class Goals:
             found.append(Marker(position=place, radius=ball.radius_m, rgba=ball.rgba))
         return found
 
+    def steer(
+        self, states: tuple[Any, ...], orders: Mapping[str, tuple[dict[str, Any], float]]
+    ) -> tuple[Any, ...]:
+        """The states with the targets of some goals set: name -> its order, and its age (s)."""
+        pairs = zip(self.goals, states, strict=True)
+        return tuple(
+            goal.steer(state, *orders[goal.name]) if goal.name in orders else state
+            for goal, state in pairs
+        )
+
     def _seen(self, kinematics: Kinematics) -> list[Kinematics]:
         """What each goal sees: the character, and its own balls alone."""
         seen, first = [], 0
@@ -110,7 +120,7 @@ class Goals:
 def equipment_of(names: Collection[str]) -> Equipment:
     """What the character must be loaded with for the goals of a config, before they are made."""
     for name in names:
-        _check_name(name, tuple(GOALS), "composite.goals")
+        check_name(name, tuple(GOALS), "composite.goals")
     kinds = [GOALS[name] for name in names]
     balls = tuple(ball for kind in kinds for ball in kind.balls)
     return Equipment(balls=balls, racket=any(getattr(kind, "racket", False) for kind in kinds))
@@ -131,12 +141,12 @@ def _make(
     name: str, values: Mapping[str, Any] | None, character: CharacterSpec, control_dt: float
 ) -> Goal:
     key = f"composite.goals.{name}"
-    _check_name(name, tuple(GOALS), "composite.goals")
+    check_name(name, tuple(GOALS), "composite.goals")
     goal = GOALS[name]
     fields = {f.name: f for f in dataclasses.fields(goal) if f.default is not dataclasses.MISSING}
     arguments = {}
     for setting, value in (values or {}).items():
-        _check_name(setting, tuple(fields), key)
+        check_name(setting, tuple(fields), key)
         arguments[setting] = _converted(value, fields[setting].default, f"{key}.{setting}")
     wanted: Mapping[str, str] = getattr(goal, "links", {})
     links = {field: character.link(link) for field, link in wanted.items()}
@@ -155,7 +165,8 @@ def _converted(value: Any, default: Any, key: str) -> Any:
     return tuple(made) if count > 1 else made[0]
 
 
-def _check_name(name: str, known: tuple[str, ...], key: str) -> None:
+def check_name(name: str, known: tuple[str, ...], key: str) -> None:
+    """Raises ConfigError with a suggestion where a name is not known."""
     if name not in known:
         close = difflib.get_close_matches(name, known, n=1)
         hint = f"; did you mean {close[0]!r}?" if close else ""

@@ -18,6 +18,9 @@ from getup_jax import rotation
 from getup_jax.physics.props import Ball
 from getup_jax.types import Kinematics, PropCommand
 
+REQUIRED = object()  # default of an order's number that must be given
+HELD_S = 1.0  # time left (s) of a target that is held until another order
+
 
 @struct.dataclass
 class GoalOutput:
@@ -63,6 +66,13 @@ class Goal(Protocol):
 
     def markers(self, state: Any, kinematics: Kinematics) -> list[Marker]:
         """What to draw for one episode, given rows without the axis B. Host only."""
+        ...
+
+    def steer(self, state: Any, order: dict[str, Any], age_s: float) -> Any:
+        """The state with the target of an order of that age; asked again every control step.
+
+        Orders are the numbers that `orders` of a goal names, each with its count and default.
+        """
         ...
 
 

@@ -9,7 +9,7 @@ hand earns 1 while it holds a ball, and less the farther it is from the ball tha
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -133,6 +133,10 @@ class Juggling:
         wanted = {int(hand) for hand in np.asarray(state.catcher)[flying]}
         places = [np.asarray(kinematics.link_position[hands[hand]]) for hand in sorted(wanted)]
         return [Marker(position=p, radius=self.catch_m, rgba=(0.2, 0.8, 0.2, 0.3)) for p in places]
+
+    def steer(self, state: JugglingState, order: dict[str, Any], age_s: float) -> JugglingState:
+        """There is nothing to set: no `orders`."""
+        return state
 
     def _releasing(self, frame: jax.Array) -> jax.Array:
         """The hand that lets go in this control step, [B]; NONE in most."""

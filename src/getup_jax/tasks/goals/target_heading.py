@@ -6,7 +6,7 @@ The paper's appendix with the details is not public; this follows its target loc
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +15,8 @@ from flax import struct
 
 from getup_jax.physics.props import Ball
 from getup_jax.tasks.goals.goal import (
+    HELD_S,
+    REQUIRED,
     GoalOutput,
     Marker,
     floor_direction,
@@ -49,6 +51,7 @@ class TargetHeading:
     name: ClassVar[str] = "target_heading"
     observation_size: ClassVar[int] = 3
     balls: ClassVar[tuple[Ball, ...]] = ()
+    orders: ClassVar[dict[str, tuple[int, Any]]] = {"yaw_deg": (1, REQUIRED), "speed": (1, None)}
 
     def reset(self, key: jax.Array, kinematics: Kinematics) -> HeadingState:
         """A direction off the heading that the character has."""
@@ -84,3 +87,12 @@ class TargetHeading:
         root = np.asarray(kinematics.link_position[0])
         reach = np.append(np.asarray(state.direction * state.speed), 0.0)
         return [Marker(position=np.array([root[0], root[1], 0.05]), reach=reach, radius=0.03)]
+
+    def steer(self, state: HeadingState, order: dict[str, Any], age_s: float) -> HeadingState:
+        """Go along `yaw_deg` (world, 0 along x) at `speed` (m/s; None: the range's middle)."""
+        speed = sum(self.speed) / 2 if order["speed"] is None else order["speed"]
+        return HeadingState(
+            direction=floor_direction(jnp.radians(jnp.full(1, order["yaw_deg"], jnp.float32))),
+            speed=jnp.full(1, speed, jnp.float32),
+            time_left=jnp.full(1, HELD_S, jnp.float32),
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -12,6 +12,8 @@ from flax import struct
 
 from getup_jax.physics.props import Ball
 from getup_jax.tasks.goals.goal import (
+    HELD_S,
+    REQUIRED,
     GoalOutput,
     Marker,
     floor_direction,
@@ -49,6 +51,7 @@ class TargetLocation:
     name: ClassVar[str] = "target_location"
     observation_size: ClassVar[int] = 4
     balls: ClassVar[tuple[Ball, ...]] = ()
+    orders: ClassVar[dict[str, tuple[int, Any]]] = {"place": (2, REQUIRED), "within_s": (1, 4.0)}
 
     def reset(self, key: jax.Array, kinematics: Kinematics) -> LocationState:
         """A place that can be reached in time at a speed of the range."""
@@ -97,6 +100,14 @@ class TargetLocation:
         place = np.append(np.asarray(state.place), 0.0)
         colour = (0.2, 0.8, 0.2, 0.8) if bool(state.reached) else (0.9, 0.2, 0.2, 0.8)
         return [Marker(position=place, radius=0.12, rgba=colour)]
+
+    def steer(self, state: LocationState, order: dict[str, Any], age_s: float) -> LocationState:
+        """Be at `place` (m, world) `within_s` from the order on; it stays the target after that."""
+        return state.replace(
+            place=jnp.asarray([order["place"]], jnp.float32),
+            time_left=jnp.full(1, max(order["within_s"] - age_s, HELD_S), jnp.float32),
+            reached=state.reached & (age_s > 0),
+        )
 
     def _way(self, state: LocationState, kinematics: Kinematics) -> tuple[jax.Array, jax.Array]:
         """Unit vector [B, 2] (world) and distance [B] (m) from the root to the place."""

@@ -8,7 +8,7 @@ next ball, so that it does not depend on how long the ball flies.
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +19,7 @@ from getup_jax import rotation
 from getup_jax.physics.props import RACKET_CENTRE_M, Ball
 from getup_jax.tasks.goals.flight import kick, landing, throw
 from getup_jax.tasks.goals.goal import (
+    REQUIRED,
     GoalOutput,
     Marker,
     floor_frame,
@@ -69,6 +70,7 @@ class TennisSwing:
     links: ClassVar[dict[str, str]] = {"hand": "hand_r"}
     racket: ClassVar[bool] = True
     observation_size: ClassVar[int] = 10
+    orders: ClassVar[dict[str, tuple[int, Any]]] = {"land": (2, REQUIRED)}
     balls: ClassVar[tuple[Ball, ...]] = (Ball("tennis_ball", 0.04, 0.058),)
 
     def reset(self, key: jax.Array, kinematics: Kinematics) -> TennisState:
@@ -148,6 +150,10 @@ class TennisSwing:
     def markers(self, state: TennisState, kinematics: Kinematics) -> list[Marker]:
         """Where the ball should land."""
         return [Marker(position=np.append(np.asarray(state.goal), 0.0), radius=0.3)]
+
+    def steer(self, state: TennisState, order: dict[str, Any], age_s: float) -> TennisState:
+        """Balls should land at `land` (m, world)."""
+        return state.replace(goal=jnp.asarray([order["land"]], jnp.float32))
 
     def _is_hit(self, state: TennisState, kinematics: Kinematics) -> jax.Array:
         """Whether [B] something near the racket has changed the ball's velocity."""
