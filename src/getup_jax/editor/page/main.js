@@ -76,6 +76,7 @@ function ready(description) {
 }
 
 simulations.addEventListener("asked", ({ detail: { slot, request } }) => {
+  strip?.cancel(); // of a motion that is no longer asked for
   if (request.released === null || slot !== store.active) return;
   latency.begin(request);
   report.measuring();
@@ -84,7 +85,6 @@ simulations.addEventListener("asked", ({ detail: { slot, request } }) => {
 simulations.addEventListener("frames", ({ detail: { slot, motion, request, first } }) => {
   due.curves = true;
   if (slot !== store.active || !first) return;
-  strip?.cancel();
   face(motion);
   latency.came(request, "first");
   if (latency.waits) whenFree(showFrame); // at once: a person waits for it

@@ -138,7 +138,8 @@ export class View {
 
   // Without shadows and sharp edges where they cost too much.
   pace(took) {
-    this.mean += 0.1 * (Math.min(took, 500) - this.mean);
+    // the first ones compile shaders, and a single one may be slow for another reason
+    this.mean += 0.1 * (Math.min(took, 2 * SLOW_MS) - this.mean);
     if (this.plain || this.mean < SLOW_MS) return;
     this.plain = true;
     this.sun.castShadow = false;
