@@ -19,7 +19,7 @@ FIRST_MS = 150.0  # from the release of a point to the first new frame, on a cor
 PAGE_MS = 75.0  # the page's and the browser's share of it, likewise
 MEMORY_MIB = 1024.0
 BUSY = 2.0  # times as long as on a core of its own: too busy to judge times
-EDIT_CPU_MS = 600.0  # of server, browser and test driver; this can be judged on a busy machine
+EDIT_CPU_MS = 800.0  # of server, browser and test driver; this can be judged on a busy machine
 
 
 def test_the_first_new_frame_of_eight_seconds_is_there_at_once(page_server):
