@@ -90,6 +90,7 @@ def test_without_a_shipped_policy_the_error_says_what_to_do(monkeypatch, capsys,
 def test_an_export_is_a_small_policy_with_a_card(run_folder, results, tmp_path, capsys):
     out = tmp_path / "assets" / "tiny"
     command = [str(run_folder), str(out), "--eval", str(results), "--machine", "2 cores"]
+    command += ["--before", "5 M steps of another policy"]
     assert export.main([*command, "--commit", "abc123"]) == 0
     assert "look at" in capsys.readouterr().out
     loaded = load_policy(out)
@@ -101,6 +102,7 @@ def test_an_export_is_a_small_policy_with_a_card(run_folder, results, tmp_path, 
     for fact in ("| control steps | 300 |", "| wall time | 1 h 01 min |", "| commit | abc123 |"):
         assert fact in card
     assert "| machine | 2 cores |" in card
+    assert "| started from | 5 M steps of another policy |" in card
     assert (
         "Lying starts, seed 0, engine native, joint noise 0.05 rad, durations T x U(0.8, 1.2)"
         in card
@@ -115,6 +117,7 @@ def test_an_export_can_be_made_again_and_says_what_is_unknown(run_folder, tmp_pa
     card = (out / CARD).read_text()
     assert "| machine | unknown |" in card
     assert "Not evaluated yet." in card
+    assert "started from" not in card
 
 
 def test_results_of_another_policy_are_refused(run_folder, results, tmp_path, capsys):

@@ -29,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """`python -m getup_jax.export`; returns the exit code."""
     args = _parser().parse_args(argv)
     try:
-        folder = export(args.run, args.out, args.eval, args.machine, args.commit)
+        folder = export(args.run, args.out, args.eval, args.machine, args.commit, args.before)
     except ValueError as error:
         if not type(error).__module__.startswith("getup_jax."):
             raise
@@ -46,6 +46,7 @@ def export(
     evaluations: Sequence[Path] = (),
     machine: str | None = None,
     commit: str | None = None,
+    before: str | None = None,
 ) -> Path:
     """Write the newest policy of a run (or one checkpoint) and its card to the folder `out`.
 
@@ -53,7 +54,7 @@ def export(
     """
     loaded = checkpoint.load_policy(run)
     results = [_evaluation(file, loaded) for file in evaluations]
-    provenance = Provenance(commit or _commit(), _wall_s(loaded), machine)
+    provenance = Provenance(commit or _commit(), _wall_s(loaded), machine, before)
     text = model_card(out.name, loaded, provenance, results)
     checkpoint.export_policy(loaded.path, out)
     (out / CARD).write_text(text, encoding="utf-8")
@@ -119,6 +120,11 @@ def _parser() -> argparse.ArgumentParser:
         help="results of getup-eval --json for the card; may be given several times",
     )
     add("--machine", metavar="TEXT", help="what it was trained on, for the card")
+    add(
+        "--before",
+        metavar="TEXT",
+        help="for the card, where train.init_from began with a trained policy: its steps and time",
+    )
     add("--commit", metavar="HASH", help="of the training's code (default: of this checkout)")
     return parser
 

@@ -46,6 +46,7 @@ class Provenance:
     commit: str | None = None  # of the code
     wall_s: float | None = None  # of the whole training
     machine: str | None = None
+    before: str | None = None  # the training of the policy that this one started from
 
 
 def model_card(
@@ -68,10 +69,12 @@ def model_card(
 def _training(loaded: LoadedPolicy, provenance: Provenance) -> dict[str, str]:
     config, steps = loaded.config, loaded.metadata.get("steps")
     wall_s = provenance.wall_s
+    began = {} if provenance.before is None else {"started from": provenance.before}
     return {
         "data": f"motions {', '.join(config.motion.source)}",
         "curves": ", ".join(config.motion.curves) or "all of them",
         "control steps": _UNKNOWN if steps is None else f"{steps:,}",
+        **began,
         "wall time": _UNKNOWN if wall_s is None else duration(wall_s),
         "machine": provenance.machine or _UNKNOWN,
         "seed": str(config.seed),
