@@ -75,7 +75,9 @@ class GetUpTask:
         """B fresh episodes."""
         key_start, key_state = jax.random.split(key)
         learned = focus.first(world.pool) if self.config.focus > 0 else None
-        levels = jnp.ones_like(learned) if self.config.assist > 0 else None
+        levels = None
+        if learned is not None and self.config.assist > 0:
+            levels = jnp.ones_like(learned)
         progress = None if self.terrain is None else curriculum.first(self.terrain)
         drawn = draw_starts(self.config, world, key_start, num_envs, learned, progress, levels)
         state = self._begin(world, drawn, levels)
