@@ -6,6 +6,7 @@ import sys
 import mujoco
 import numpy as np
 import pytest
+from fake_writer import FakeWriter
 
 from eval_samples import make_task, run
 from getup_jax import video
@@ -13,27 +14,6 @@ from getup_jax.conditions import Conditions
 from getup_jax.config import ConfigError
 from getup_jax.episodes import Episodes
 from getup_jax.motion.clips import GetUp
-
-
-class FakeWriter:
-    """Notes what is written, and with which settings."""
-
-    def __init__(self) -> None:
-        self.images: list[np.ndarray] = []
-        self.settings: dict = {}
-
-    def get_writer(self, path, **settings):
-        self.settings = settings
-        return self
-
-    def append_data(self, image) -> None:
-        self.images.append(image)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        return None
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from fake_writer import FakeWriter
 from tiny_composite import COMPOSITE, clips
 
 from getup_jax import video
@@ -26,25 +27,6 @@ class FakeEngine:
     """Only its rate is asked for."""
 
     control_dt = 1 / 30
-
-
-class Writer:
-    """Keeps the pictures."""
-
-    def __init__(self) -> None:
-        self.images: list[np.ndarray] = []
-
-    def get_writer(self, path, **settings):
-        return self
-
-    def append_data(self, image) -> None:
-        self.images.append(image)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        return None
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +71,7 @@ def test_markers_follow_the_goals_step_by_step(built):
 def test_a_place_in_sight_is_in_the_picture(built, tmp_path, monkeypatch):
     pictures = []
     for place in ((0.4, 0.0), (500.0, 0.0)):
-        writer = Writer()
+        writer = FakeWriter()
         monkeypatch.setattr(video, "require", lambda found=writer: found)
         try:
             film.film(tmp_path / "a.mp4", built, episodes(built, place))
