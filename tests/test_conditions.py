@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tiny_task import getups
 
-from getup_jax.conditions import Conditions, blended, make_plan, orientation
+from getup_jax.conditions import Conditions, blended, make_plan, of_config, orientation
 from getup_jax.config import Config, ConfigError, PhysicsConfig
 from getup_jax.motion.clips import GetUp
 from getup_jax.physics.character import CharacterSpec, load_character
@@ -109,3 +109,15 @@ def test_orientation_is_that_of_the_first_front_angle(front, expected):
     points = np.zeros((9, 3))
     points[0, 2] = front
     assert orientation(GetUp("a", 1.0, points)) == expected
+
+
+def test_the_motions_of_another_config_take_the_place_of_the_trained_ones(
+    styles, character, tmp_path
+):
+    config = tmp_path / "other.yaml"
+    config.write_text("motion: {curves: [prone_half_kneel_left, roll_over_quadruped@5.1]}\n")
+    found = of_config(str(config), styles, character)
+    assert [g.name for g in found] == ["prone_half_kneel_left", "roll_over_quadruped@5.1"]
+    config.write_text("motions: {}\n")
+    with pytest.raises(ConfigError, match="motions"):
+        of_config(str(config), styles, character)

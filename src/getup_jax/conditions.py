@@ -14,7 +14,9 @@ from getup_jax.config import Config, ConfigError
 from getup_jax.motion import events
 from getup_jax.motion.clips import Clip, GetUp
 from getup_jax.motion.curve_file import CurveFile
+from getup_jax.motion.library import load_motions
 from getup_jax.physics.character import CharacterSpec
+from getup_jax.settings import load_config
 from getup_jax.tasks.episode import LYING, STANDING
 from getup_jax.tasks.region_pool import region_starts
 from getup_jax.tasks.reset_pool import Pool, angle_gap
@@ -33,6 +35,7 @@ class Conditions:
     push_ns: float | None = None  # impulse to the chest while standing
     seed: int = 0
     curves: tuple[str, ...] = ()  # curve files in place of the trained styles
+    motions: str | None = None  # a config whose motions are there in place of the trained styles
 
     @classmethod
     def of(cls, args: argparse.Namespace) -> Conditions:
@@ -45,6 +48,7 @@ class Conditions:
             push_ns=args.push,
             seed=args.seed,
             curves=tuple(map(str, args.curves or ())),
+            motions=None if args.motions is None else str(args.motions),
         )
 
     @property
@@ -154,6 +158,14 @@ def drawn(
     return tuple(
         getup for file in files for getup in file.getups(file.start_clip(clips, character))
     )
+
+
+def of_config(path: str, getups: Sequence[GetUp], character: CharacterSpec) -> tuple[GetUp, ...]:
+    """The get-ups of a config's `motion` section, in place of `getups`."""
+    found = load_motions(load_config(path).motion, character).getups
+    if not found:
+        raise ConfigError(f"--motions {path}: motion.source: no get-ups found")
+    return found
 
 
 def reference_clips(getups: Sequence[GetUp]) -> dict[str, Clip]:

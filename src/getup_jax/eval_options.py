@@ -17,6 +17,7 @@ examples:
                                                        other start poses, faster and slower
   getup-eval --blend --push 20                         curves never seen, and pushes
   getup-eval --curves my_rise.yaml                     a style from getup-edit
+  getup-eval --motions configs/flat_lafan1.yaml        recorded get-ups that it has never seen
 
 Every start has a random heading. Without --start-noise, episodes of one style differ in
 nothing else, so that more of them say little more.
@@ -96,6 +97,13 @@ def _add_conditions(group: argparse._ArgumentGroup) -> None:
         metavar="FILE",
         help="the styles in these curve files in place of the trained ones, each from the first "
         "pose of the motion that it names; what getup-edit saves and shows",
+    )
+    styles.add_argument(
+        "--motions",
+        type=Path,
+        metavar="CONFIG",
+        help="the get-ups that the `motion` section of another config names, in place of the "
+        "trained ones",
     )
     styles.add_argument(
         "--blend",

@@ -18,7 +18,7 @@ from getup_jax.algo.learner import Learner, make_learner
 from getup_jax.algo.state import PolicyState
 from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.composite.evaluate import evaluate_composite
-from getup_jax.conditions import Conditions, blended, drawn, make_plan
+from getup_jax.conditions import Conditions, blended, drawn, make_plan, of_config
 from getup_jax.config import Config, ConfigError, TaskConfig, TerrainConfig
 from getup_jax.episodes import Episodes, run_episodes
 from getup_jax.motion.clips import GetUp
@@ -177,6 +177,8 @@ def _styles(config: Config, conditions: Conditions) -> Choice | None:
     if conditions.curves:
         files = [read_curve_file(path) for path in conditions.curves]
         return functools.partial(drawn, files)
+    if conditions.motions is not None:
+        return functools.partial(of_config, conditions.motions)
     if not conditions.blend:
         return None
 

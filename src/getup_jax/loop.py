@@ -12,6 +12,7 @@ from typing import Any
 import jax
 
 from getup_jax import checkpoint
+from getup_jax.algo.state import owned
 from getup_jax.config import Config
 from getup_jax.journal import Journal
 from getup_jax.metrics import MetricsWriter
@@ -19,6 +20,7 @@ from getup_jax.progress import Display, count, duration
 from getup_jax.stop import StopRequest
 from getup_jax.storage import CheckpointError, from_nested, is_finite, to_nested
 
+CarryOver = Callable[[Any, checkpoint.LoadedPolicy, Callable[[str], None]], Any]
 Step = Callable[[Any, Any], tuple[Any, dict[str, jax.Array]]]
 
 
@@ -33,6 +35,8 @@ class Job:
     learner: Any  # init(world, key) -> state, iteration(world, state) -> (state, metrics)
     world: Any  # pytree of arrays that every iteration reads
     prior: Any  # pytree saved beside the policy, or None
+    # (policy, its checkpoint, log) -> the policy as this job means it; None: as it is
+    carry_over: CarryOver | None = None
 
 
 def steps_per_iteration(config: Config) -> int:
@@ -92,9 +96,12 @@ class Loop:
         loaded = checkpoint.load_policy(path)
         learner = self._state.learner
         policy = from_nested(learner.policy, loaded.policy, str(loaded.path))
-        learner = dataclasses.replace(learner, policy=policy)
-        self._state = dataclasses.replace(self._state, learner=learner)
         self._display.log(f"starting with the policy of {loaded.path}")
+        if self._job.carry_over is not None:
+            policy = self._job.carry_over(policy, loaded, self._display.log)
+        # a copy: what the first iteration donates must be nobody else's
+        learner = dataclasses.replace(learner, policy=owned(policy))
+        self._state = dataclasses.replace(self._state, learner=learner)
 
     def _compile(self) -> Step:
         """The iteration as one program; nothing can make it compile again during the run."""

@@ -8,18 +8,23 @@ from pathlib import Path
 
 import jax
 
-from getup_jax import checkpoint
-from getup_jax.algo.learner import make_learner
+from getup_jax import checkpoint, transfer
+from getup_jax.algo.learner import Learner, make_learner
 from getup_jax.algo.meta_chain import with_meta
 from getup_jax.algo.objectives import make_objectives
+from getup_jax.algo.state import PolicyState
+from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.config import Config
-from getup_jax.loop import Job, Loop, TrainingError, num_iterations, steps_per_iteration
+from getup_jax.loop import CarryOver, Job, Loop, TrainingError, num_iterations, steps_per_iteration
 from getup_jax.metrics import MetricsWriter, tensorboard_module
+from getup_jax.nets import prior as pose_prior
 from getup_jax.progress import Display, count, duration
 from getup_jax.runfolder import prepare, resume_command
 from getup_jax.stop import StopRequest
+from getup_jax.storage import CheckpointError
 from getup_jax.tasks.build import build_task
 from getup_jax.tasks.build_composite import BuiltComposite, build_composite
+from getup_jax.tasks.getup import World
 from getup_jax.tasks.styled import with_objectives
 
 __all__ = ["Job", "TrainingError", "build_job", "run"]
@@ -42,7 +47,21 @@ def build_job(config: Config, log: Log) -> Job:
         total_steps=config.train.total_steps,
         objectives=objectives,
     )
-    return Job(learner=learner, world=task.world, prior=task.prior)
+    carry_over = None if task.prior is None else _carry_over(learner, task.world, config.seed)
+    return Job(learner=learner, world=task.world, prior=task.prior, carry_over=carry_over)
+
+
+def _carry_over(learner: Learner, world: World, seed: int) -> CarryOver:
+    def carry_over(policy: PolicyState, loaded: LoadedPolicy, log: Log) -> PolicyState:
+        if loaded.prior is None:
+            raise CheckpointError(
+                f"train.init_from: {loaded.path}: was trained without a pose prior, this run has "
+                "one; set prior: null, or start from another policy"
+            )
+        prior, key = pose_prior.from_dict(loaded.prior), jax.random.PRNGKey(seed)
+        return transfer.carry_over(learner, world, policy, loaded.config.task, prior, key, log)
+
+    return carry_over
 
 
 def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Job]:

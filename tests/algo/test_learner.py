@@ -235,6 +235,27 @@ def test_rate_adapts_only_when_asked(run: Run, popart_run: Run):
     assert (float(scale) != 1.0) == bool(outside)
 
 
+def test_the_critic_learns_first_and_the_rate_finds_its_scale_meanwhile():
+    config = dataclasses.replace(
+        CONFIG, critic_first=3, target_clip_fraction=0.01, normalize_observation=False
+    )
+    run = Run(make_learner(Probe(), NETWORK, config, TOTAL_STEPS))
+    world = make_world(by_action=1.0)
+    first = run.initial(world, jax.random.key(0)).learner
+    state, _ = run.train(world, iterations=3)
+    for before, after in zip(
+        jax.tree.leaves(first.policy.actor),
+        jax.tree.leaves(state.learner.policy.actor),
+        strict=True,
+    ):
+        assert_array_equal(before, after)
+    assert not np.array_equal(_values(run, state), run.learner.value(first, SIGNS)[:, 0])
+    assert float(state.learner.learning_rate_scale) < 0.7  # it would have been far too fast
+    actions = _actions(run, state)
+    state, _ = run.iteration(world, state)
+    assert not np.array_equal(_actions(run, state), actions)
+
+
 def test_switched_off_parts_are_none():
     config = dataclasses.replace(CONFIG, normalize_observation=False)
     learner = make_learner(Probe(), NETWORK, config, TOTAL_STEPS)

@@ -167,6 +167,17 @@ def test_the_shipped_paths_are_of_the_shipped_character(character):
         np.testing.assert_allclose(np.linalg.norm(path.qpos[:, 3:7], axis=1), 1.0, atol=1e-4)
 
 
+def test_without_a_pose_prior_a_found_state_has_no_action(character, tmp_path):
+    style = getups(character)[0]
+    path = found_path(character, np.zeros(2))
+    save_path(tmp_path, style, path)
+    (found,) = load_paths(str(tmp_path), [style], character.num_joints, character.num_joints)
+    assert found is not None
+    np.testing.assert_array_equal(found.qpos, path.qpos)
+    assert found.action.shape == (len(path.time), character.num_joints)
+    assert np.isnan(found.action).all()
+
+
 def test_paths_that_cannot_be_used_say_why(character, engine, tmp_path):
     with pytest.raises(ConfigError, match=r"task\.paths: no folder .*getup-search"):
         pool_of(character, engine, paths=str(tmp_path / "none"))

@@ -203,20 +203,18 @@ class Learner:
 
 
 def _critic_only(wait: jax.Array, learner: LearnerState, improved: LearnerState) -> LearnerState:
-    """The improved learner, with the old actor and rate scale as long as wait [] is true.
+    """The improved learner, with the old actor as long as wait [] is true.
 
-    A policy that was trained before meets a critic that knows nothing yet.
+    A policy that was trained before meets a critic that knows nothing yet. The rate's scale adapts
+    all the same: it was low at the end of that training, and the first full step would be too far.
     """
 
-    def old(before: Any, after: Any) -> Any:
-        return jax.tree.map(lambda a, b: jnp.where(wait, a, b), before, after)
+    def old(before: jax.Array, after: jax.Array) -> jax.Array:
+        return jnp.where(wait, before, after)
 
-    actor = old(learner.policy.actor, improved.policy.actor)
-    return dataclasses.replace(
-        improved,
-        policy=dataclasses.replace(improved.policy, actor=actor),
-        learning_rate_scale=old(learner.learning_rate_scale, improved.learning_rate_scale),
-    )
+    actor = jax.tree.map(old, learner.policy.actor, improved.policy.actor)
+    policy = dataclasses.replace(improved.policy, actor=actor)
+    return dataclasses.replace(improved, policy=policy)
 
 
 def _unless_first(learner: LearnerState, improved: LearnerState) -> LearnerState:

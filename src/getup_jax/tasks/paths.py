@@ -78,7 +78,8 @@ def load_paths(
 ) -> list[FoundPath | None]:
     """The states of every style, of all its files in one; None for a style that has none.
 
-    folder: of getup-search, or `authored` for those that are shipped.
+    folder: of getup-search, or `authored` for those that are shipped. Without a pose prior
+    (action_size = num_joints) a state's action is unknown, NaN, and only the state is taken.
     """
     place = asset_path("paths") if folder == SHIPPED else Path(folder)
     if not place.is_dir():
@@ -89,6 +90,8 @@ def load_paths(
     for getup in getups:
         files = sorted(place.glob(f"{getup.name}.[0-9]*.npz"))
         paths = [load_path(file) for file in files]
+        if action_size == num_joints:
+            paths = [_without_action(path, action_size) for path in paths]
         for file, path in zip(files, paths, strict=True):
             shape = path.qpos.shape[1], path.action.shape[1]
             if shape != (7 + num_joints, action_size):
@@ -98,6 +101,10 @@ def load_paths(
                 )
         found.append(_joined(paths) if paths else None)
     return found
+
+
+def _without_action(path: FoundPath, action_size: int) -> FoundPath:
+    return dataclasses.replace(path, action=np.full((len(path.time), action_size), np.nan))
 
 
 def _joined(paths: Sequence[FoundPath]) -> FoundPath:
