@@ -48,7 +48,7 @@ def names_read(folder: Path) -> set[str]:
     """The attributes that the sources read, `x.name`, outside of the config itself."""
     names = set()
     for path in folder.rglob("*.py"):
-        if path == folder / "config.py":
+        if path.parent == folder / "config":
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load):

@@ -133,7 +133,7 @@ def _train_parser() -> argparse.ArgumentParser:
         metavar="key=value",
         nargs="*",
         help="settings that replace the file's, such as ppo.num_envs=256; all of them, with "
-        "their defaults and meaning, are in getup_jax/config.py",
+        "their defaults and meaning, are in getup_jax/config/",
     )
     add("--run", type=Path, metavar="FOLDER", help="the run's folder (default: runs/NAME)")
     add("--resume", action="store_true", help="continue the run that is in the folder, if any")

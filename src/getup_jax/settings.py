@@ -1,6 +1,6 @@
 """YAML files and `section.key=value` overrides into a Config, and back.
 
-A YAML file holds only what differs from the defaults in `config.py`. Values convert by
+A YAML file holds only what differs from the defaults in `config/`. Values convert by
 the annotation of their field, so 3e-4 is a number although PyYAML reads it as text.
 """
 

@@ -1,0 +1,66 @@
+"""Every setting, its default and its meaning; YAML files hold only differences.
+
+Sub-configs that are None are switched off, and the switch is decided when the step is
+traced. `load_config` is in `settings.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import field
+
+from getup_jax.config.check import ConfigError, require
+from getup_jax.config.composite import CompositeConfig, DiscriminatorConfig, GroupConfig
+from getup_jax.config.learning import NetworkConfig, PPOConfig, TrainConfig
+from getup_jax.config.simulation import MotionConfig, PhysicsConfig, PriorConfig, TerrainConfig
+from getup_jax.config.task import TaskConfig
+
+__all__ = [
+    "CompositeConfig",
+    "Config",
+    "ConfigError",
+    "DiscriminatorConfig",
+    "GroupConfig",
+    "MotionConfig",
+    "NetworkConfig",
+    "PPOConfig",
+    "PhysicsConfig",
+    "PriorConfig",
+    "TaskConfig",
+    "TerrainConfig",
+    "TrainConfig",
+]
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """One run. `getup-train FILE section.key=value ...` overrides any of it."""
+
+    seed: int = 0
+    physics: PhysicsConfig = field(default_factory=PhysicsConfig)
+    motion: MotionConfig = field(default_factory=MotionConfig)
+    # None: no pose prior, the action is the servo target and no offset is unnatural
+    prior: PriorConfig | None = field(default_factory=PriorConfig)
+    task: TaskConfig = field(default_factory=TaskConfig)
+    terrain: TerrainConfig | None = None  # None: a flat plane
+    composite: CompositeConfig | None = None  # None: the get-up task
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+    train: TrainConfig = field(default_factory=TrainConfig)
+
+    @property
+    def composite_motion(self) -> bool:
+        """Whether the task is composite motion; False: getting up."""
+        return self.composite is not None and self.composite.task == "composite"
+
+    def __post_init__(self) -> None:
+        if self.composite is None or not self.composite.groups:
+            return
+        flat = "null with composite motion or discriminators, which are on a plane"
+        ok = self.terrain is None or not self.composite.groups
+        require(ok, "terrain", flat, self.terrain)
+        batch = self.ppo.num_envs * self.ppo.num_steps
+        size = self.composite.discriminator.minibatch_size
+        seen = round(batch * self.composite.discriminator.share)
+        expected = f"a divisor of ppo.num_envs * ppo.num_steps = {batch}, times share = {seen}"
+        require(seen % size == 0, "composite.discriminator.minibatch_size", expected, size)

@@ -1,0 +1,141 @@
+"""Composite motion: groups of links, their discriminators, and the objectives."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import field
+from typing import Any
+
+from getup_jax.config.check import require
+
+
+@dataclasses.dataclass(frozen=True)
+class GroupConfig:
+    """Links that imitate clips of their own, judged by a discriminator of their own [C 4.1]."""
+
+    links: tuple[str, ...] = ()  # names of links, or of presets: upper, lower, arms, rest, full
+    clips: tuple[str, ...] = ()  # names of authored clips, or motion files
+    frame: str = "heading"  # heading: of the newest root | root: the root's own in every frame
+    history: int = 3  # n_i of equation 3; a window has 2 frames more
+    speed: tuple[float, ...] = (1.0, 1.0)  # range of the clips' pace, drawn for each window
+
+    def __post_init__(self) -> None:
+        frames = ("heading", "root")
+        require(self.frame in frames, "composite.groups.*.frame", f"one of {frames}", self.frame)
+        ok = 0 <= self.history <= 3
+        require(ok, "composite.groups.*.history", "0 to 3, which the actor sees", self.history)
+        ok = len(self.speed) == 2 and 0 < self.speed[0] <= self.speed[1]
+        require(ok, "composite.groups.*.speed", "0 < slowest <= fastest", self.speed)
+
+
+@dataclasses.dataclass(frozen=True)
+class DiscriminatorConfig:
+    """One ensemble a group: a GRU over the window, dense layers, many heads [C 4.2]."""
+
+    gru_size: int = 256
+    hidden_sizes: tuple[int, ...] = (256, 128)
+    heads: int = 32  # N of equation 2
+    gradient_penalty: float = 10.0  # lambda of equation 2
+    # whose gradient is held at 1: sum, that of all heads together, as in the authors' release: the
+    # mean of N heads then changes by at most 1 / N a unit of distance | head, each, as equation 2
+    penalty_of: str = "sum"
+    learning_rate: float = 1e-5
+    minibatch_size: int = 256
+    share: float = 1.0  # of a rollout's windows that an update learns from, drawn at random
+    # features (m, and numbers of quaternions) that vary by less are not blown up to a std of 1:
+    # clips hold many links still, and any noise of the actions would tell the two kinds apart
+    least_std: float = 0.0
+    # windows of earlier rollouts that are kept, and make up half of the simulated ones; 0: none
+    memory: int = 0
+
+    def __post_init__(self) -> None:
+        ok = 0 < self.share <= 1
+        require(ok, "composite.discriminator.share", "more than 0, at most 1", self.share)
+        require(
+            self.memory >= 0,
+            "composite.discriminator.memory",
+            "0, or a number of windows",
+            self.memory,
+        )
+        ok = self.least_std >= 0
+        require(ok, "composite.discriminator.least_std", "at least 0", self.least_std)
+        for name in ("gru_size", "heads", "learning_rate", "minibatch_size"):
+            value = getattr(self, name)
+            require(value > 0, f"composite.discriminator.{name}", "more than 0", value)
+        kinds = ("sum", "head")
+        ok = self.penalty_of in kinds
+        key = "composite.discriminator.penalty_of"
+        require(ok, key, f"one of {kinds}", self.penalty_of)
+        ok = self.gradient_penalty >= 0
+        key = "composite.discriminator.gradient_penalty"
+        require(ok, key, "at least 0", self.gradient_penalty)
+
+
+@dataclasses.dataclass(frozen=True)
+class CompositeConfig:
+    """Several objectives, each with a critic of its own [C].
+
+    With `task: composite` it replaces the get-up task by composite motion; with `task: getup` the
+    reward terms of getting up, and discriminators for its style, are the objectives.
+    """
+
+    task: str = "composite"  # composite | getup
+    # getup: reward terms that are objectives: total (all of them multiplied), task, height,
+    # orientation, velocity, posture, natural
+    terms: tuple[str, ...] = ("total",)
+    groups: dict[str, GroupConfig] = field(default_factory=dict)
+    shared_links: tuple[str, ...] = ()  # links that several groups may have
+    free_links: tuple[str, ...] = ()  # links that need not be in any group
+    # goal tasks by name with their settings, such as {target_location: {speed: [1.2, 1.5]}}
+    goals: dict[str, dict[str, Any]] = field(default_factory=dict)
+    weights: dict[str, float] = field(default_factory=dict)  # of objectives; empty: all the same
+    multi_objective: bool = True  # False: one critic for the weighted sum of all rewards
+    discriminator: DiscriminatorConfig = field(default_factory=DiscriminatorConfig)
+    meta: str | None = None  # a composite policy whose actions this one weights and adds to [C 5]
+    start_group: str | None = None  # episodes start along its clips; None: the last group's
+    start_mixed: bool = False  # and with the other groups' hinges from their own clips
+    episode_s: float = 10.0
+    # training episodes are cut at random, on average after this long: more samples near the clips,
+    # where an episode starts and a policy learns to go on with a motion; None: only at episode_s
+    cut_s: float | None = None
+    end_reward: float = -1.0  # of every objective in the step that ends an episode early
+    fall_height_m: float = 0.15  # a joint centre below it, but for the feet's, is a fall
+    action_scale: float = 1.0  # times the range below, moved by an action of 1
+    # range: of a hinge, its whole range | clips: as much as the clips move it, and a little more
+    action_range: str = "range"
+    # pose of action 0; clips: of each hinge the mean over its group's clips | neutral
+    action_centre: str = "clips"
+
+    def __post_init__(self) -> None:
+        tasks = ("composite", "getup")
+        require(self.task in tasks, "composite.task", f"one of {tasks}", self.task)
+        if self.task == "getup":
+            self._check_getup()
+        else:
+            require(bool(self.groups), "composite.groups", "at least one group", self.groups)
+        require(self.episode_s > 0, "composite.episode_s", "more than 0", self.episode_s)
+        require(self.action_scale > 0, "composite.action_scale", "more than 0", self.action_scale)
+        require(
+            self.cut_s is None or self.cut_s > 0,
+            "composite.cut_s",
+            "more than 0, or null",
+            self.cut_s,
+        )
+        centres, centre = ("clips", "neutral"), self.action_centre
+        ok = centre in centres
+        require(ok, "composite.action_centre", f"one of {centres}", centre)
+        ranges = ("range", "clips")
+        ok = self.action_range in ranges
+        require(ok, "composite.action_range", f"one of {ranges}", self.action_range)
+        start = self.start_group
+        names = tuple(self.groups)
+        ok = start is None or start in names
+        require(ok, "composite.start_group", f"one of {names}, or null", start)
+
+    def _check_getup(self) -> None:
+        known = ("total", "task", "height", "orientation", "velocity", "posture", "natural")
+        ok = set(self.terms) <= set(known) and len(set(self.terms)) == len(self.terms) > 0
+        require(ok, "composite.terms", f"some of {known}", self.terms)
+        for name, empty in (("goals", {}), ("meta", None)):
+            value = getattr(self, name)
+            require(value == empty, f"composite.{name}", "none while getting up", value)
