@@ -12,6 +12,7 @@ from tiny_composite import CONFIG, clips, tiny_composite
 
 from getup_jax.config import ConfigError
 from getup_jax.physics.character import load_character
+from getup_jax.tasks import cuts
 from getup_jax.tasks.build_composite import (
     action_centre,
     action_scale,
@@ -20,6 +21,7 @@ from getup_jax.tasks.build_composite import (
 )
 from getup_jax.tasks.composite import FRAMES, LINK_STATE, observe
 from getup_jax.tasks.reference_windows import window_at
+from getup_jax.types import StepOutput
 
 SIZE = 16
 
@@ -194,10 +196,43 @@ def test_cuts_end_a_share_of_the_episodes_and_no_failed_one(built, steps):
     env = built.environment
     cut = dataclasses.replace(env, config=dataclasses.replace(env.config, cut_s=2 / 30))
     many = outputs[0].replace(terminated=jnp.arange(4000) < 1000, truncated=jnp.zeros(4000, bool))
-    found = cut._cut(many, jax.random.key(0))
+    found = cut._cut(None, many, jax.random.key(0))
     assert not np.any(found.truncated[:1000])
     assert_allclose(np.mean(found.truncated[1000:]), 0.5, atol=0.03)
-    assert env._cut(many, jax.random.key(0)) is many
+    assert env._cut(None, many, jax.random.key(0)) is many
+
+
+def test_the_time_to_a_cut_follows_success():
+    """It grows without failures, is kept where a tenth fail, and shrinks where more do."""
+    ended, none, first = jnp.ones(1000, bool), jnp.zeros(1000, bool), jnp.float32(1.0)
+    grown = cuts.followed(first, none, ended, 0.5, 10.0)
+    assert_allclose(grown, np.exp(0.1), rtol=1e-6)
+    tenth = jnp.arange(1000) < 100
+    assert_allclose(cuts.followed(first, tenth, ~tenth, 0.5, 10.0), 1.0, rtol=1e-6)
+    assert_allclose(cuts.followed(first, none, none, 0.5, 10.0), 1.0)
+    assert_allclose(cuts.followed(first, ended, none, 0.5, 10.0), 0.5)  # the least
+    assert_allclose(cuts.followed(jnp.float32(9.9), none, ended, 0.5, 10.0), 10.0)
+
+
+def test_a_growing_cut_is_kept_in_the_state_and_logged(built):
+    env = built.environment
+    config = dataclasses.replace(env.config, cut_s=0.5, cut_grows=True)
+    env = dataclasses.replace(env, config=config)
+    state = env.init(built.world, jax.random.key(0), 4)
+    assert float(state.cut_s) == 0.5
+    output = StepOutput(
+        observation=state.observation,
+        final_observation=state.observation,
+        reward=jnp.zeros((4, 2)),
+        terminated=jnp.zeros(4, bool),
+        truncated=jnp.ones(4, bool),
+        metrics={},
+        episode={},
+    )
+    mean_s, metrics = env._next_cut(state.cut_s, output)
+    assert_allclose(mean_s, 0.5 * np.exp(4e-4), rtol=1e-6)
+    assert_allclose(metrics["cut_s"], mean_s)
+    assert metrics["cut_s"].shape == (4,)
 
 
 def test_actions_move_a_hinge_as_much_as_its_clips_do(character):

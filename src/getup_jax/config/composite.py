@@ -98,6 +98,7 @@ class CompositeConfig:
     # training episodes are cut at random, on average after this long: more samples near the clips,
     # where an episode starts and a policy learns to go on with a motion; None: only at episode_s
     cut_s: float | None = None
+    cut_grows: bool = False  # from cut_s towards episode_s, while few episodes fail before
     end_reward: float = -1.0  # of every objective in the step that ends an episode early
     fall_height_m: float = 0.15  # a joint centre below it, but for the feet's, is a fall
     action_scale: float = 1.0  # times the range below, moved by an action of 1
@@ -121,6 +122,8 @@ class CompositeConfig:
             "more than 0, or null",
             self.cut_s,
         )
+        ok = not self.cut_grows or self.cut_s is not None
+        require(ok, "composite.cut_s", "a first time where composite.cut_grows", self.cut_s)
         centres, centre = ("clips", "neutral"), self.action_centre
         ok = centre in centres
         require(ok, "composite.action_centre", f"one of {centres}", centre)

@@ -17,6 +17,7 @@ from getup_jax import rotation
 from getup_jax.config import CompositeConfig
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.rows import replace_rows
+from getup_jax.tasks import cuts
 from getup_jax.tasks.goals.combine import Goals
 from getup_jax.tasks.goals.goal import GoalOutput
 from getup_jax.tasks.groups import Group
@@ -61,6 +62,7 @@ class CompositeState:
     attempts: jax.Array  # [B, G] attempts at each goal that ended in this episode
     successes: jax.Array  # [B, G] those that succeeded
     key: Any
+    cut_s: Any = None  # [] mean time to a random end, where it grows; None: the setting
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -102,7 +104,8 @@ class CompositeTask:
         """B fresh episodes."""
         key_row, key_start, key_state = jax.random.split(key, 3)
         row = self._draw(world, key_row, num_envs)
-        return self.start(world, row, key_start).replace(key=key_state)
+        first_s = jnp.asarray(self.config.cut_s, jnp.float32) if self.config.cut_grows else None
+        return self.start(world, row, key_start).replace(key=key_state, cut_s=first_s)
 
     def start(self, world: CompositeWorld, row: jax.Array, key: jax.Array) -> CompositeState:
         """Episodes from rows [B] of the start states; the key is for their goals."""
@@ -133,9 +136,11 @@ class CompositeTask:
             # the first index of a chunk is in no other
             return self.start(world, drawn[index], jax.random.fold_in(key_start, index[0]))
 
-        after = replace_rows(after.replace(key=None), done, fresh, _RESET_CHUNK)
-        after = after.replace(key=key_next)
-        return after, output.replace(observation=after.observation)
+        cut_s, metrics = self._next_cut(after.cut_s, output)
+        after = replace_rows(after.replace(key=None, cut_s=None), done, fresh, _RESET_CHUNK)
+        after = after.replace(key=key_next, cut_s=cut_s)
+        output = output.replace(observation=after.observation, metrics=output.metrics | metrics)
+        return after, output
 
     def advance(
         self, world: CompositeWorld, state: CompositeState, action: jax.Array
@@ -161,15 +166,25 @@ class CompositeTask:
             **_count(state, goal_outputs),
         )
         output = self._output(world, state, goal_outputs)
-        return state, self._cut(output, jax.random.fold_in(key_goals, _CUT))
+        return state, self._cut(state.cut_s, output, jax.random.fold_in(key_goals, _CUT))
 
-    def _cut(self, output: StepOutput, key: jax.Array) -> StepOutput:
-        """Ends some episodes at random, `cut_s` after their start on average."""
-        if self.config.cut_s is None:
+    def _cut(self, mean_s: jax.Array | None, output: StepOutput, key: jax.Array) -> StepOutput:
+        """Ends some episodes at random, mean_s (None: the setting) after their start on average."""
+        average_s = self.config.cut_s if mean_s is None else mean_s
+        if average_s is None:
             return output
-        chance = self.engine.control_dt / self.config.cut_s
-        cut = jax.random.uniform(key, output.truncated.shape) < chance
-        return output.replace(truncated=output.truncated | (cut & ~output.terminated))
+        chance = jnp.asarray(self.engine.control_dt / average_s)
+        return output.replace(truncated=cuts.cut(output.truncated, output.terminated, chance, key))
+
+    def _next_cut(
+        self, mean_s: jax.Array | None, output: StepOutput
+    ) -> tuple[jax.Array | None, dict[str, jax.Array]]:
+        """The mean time to a cut after a step, and what to log of it."""
+        least_s, most_s = self.config.cut_s, self.config.episode_s
+        if mean_s is None or least_s is None:
+            return mean_s, {}
+        mean_s = cuts.followed(mean_s, output.terminated, output.truncated, least_s, most_s)
+        return mean_s, {"cut_s": jnp.broadcast_to(mean_s, output.terminated.shape)}
 
     def _output(
         self, world: CompositeWorld, state: CompositeState, goals: tuple[GoalOutput, ...]
