@@ -56,6 +56,9 @@ def test_penalty_of_a_linear_ensemble():
     found = gradient_penalty(lambda x: x.reshape(len(x), -1) @ heads, pairs, each=True)
     first, second = (np.linalg.norm(np.asarray(heads, np.float64), axis=0) - 1.0) ** 2
     assert_allclose(found, (4 * first + 3 * second) / 7, rtol=1e-5)
+    # held at a quarter, gradients are four times as far up
+    found = gradient_penalty(lambda x: x.reshape(len(x), -1) @ heads, pairs, norm=0.25)
+    assert_allclose(found, (4.0 * norm - 1.0) ** 2, rtol=1e-5)
 
 
 def test_penalty_is_taken_between_the_windows():

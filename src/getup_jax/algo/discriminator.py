@@ -144,8 +144,11 @@ class Discriminator:
 
         fake, real = ensemble(pairs.fake), ensemble(pairs.real)
         hinge = hinge_loss(fake, real)
-        penalty = gradient_penalty(ensemble, pairs, each=self.config.penalty_of == "head")
-        loss = hinge + self.config.gradient_penalty * penalty
+        config = self.config
+        penalty = gradient_penalty(
+            ensemble, pairs, each=config.penalty_of == "head", norm=config.gradient_norm
+        )
+        loss = hinge + config.gradient_penalty * penalty
         metrics = {
             "loss": loss,
             "penalty": penalty,
@@ -161,13 +164,17 @@ def hinge_loss(fake: jax.Array, real: jax.Array) -> jax.Array:
 
 
 def gradient_penalty(
-    ensemble: Callable[[jax.Array], jax.Array], pairs: Pairs, each: bool = False
+    ensemble: Callable[[jax.Array], jax.Array],
+    pairs: Pairs,
+    each: bool = False,
+    norm: float = 1.0,
 ) -> jax.Array:
-    """mean (|gradient of sum_heads D| - 1)^2 at mixtures of the windows [C equation 2].
+    """mean (|gradient of sum_heads D| / norm - 1)^2 at mixtures of the windows [C equation 2].
 
     The paper writes the penalty of each head; its authors' release takes the gradient of the sum
     of all heads, which is one gradient instead of N. With `each`, it is the paper's: a mixture
-    is judged by one head, drawn at random, so that the mean is that over heads too.
+    is judged by one head, drawn at random, so that the mean is that over heads too. In the paper
+    the norm is 1.
     """
     share = pairs.share[:, None, None]
     mixed = share * pairs.fake + (1.0 - share) * pairs.real
@@ -181,8 +188,8 @@ def gradient_penalty(
 
     gradient = jax.grad(output)(mixed)
     # the root has no derivative at 0, where a fresh network of dead units could be
-    norm = jnp.sqrt(jnp.sum(jnp.square(gradient), axis=(1, 2)) + 1e-12)
-    return jnp.mean(jnp.square(norm - 1.0))
+    length = jnp.sqrt(jnp.sum(jnp.square(gradient), axis=(1, 2)) + 1e-12)
+    return jnp.mean(jnp.square(length / norm - 1.0))
 
 
 def reward(output: jax.Array) -> jax.Array:

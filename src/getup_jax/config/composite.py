@@ -39,6 +39,8 @@ class DiscriminatorConfig:
     # whose gradient is held at 1: sum, that of all heads together, as in the authors' release: the
     # mean of N heads then changes by at most 1 / N a unit of distance | head, each, as equation 2
     penalty_of: str = "sum"
+    # that norm; less than 1: the score still tells apart what is far from the clips
+    gradient_norm: float = 1.0
     learning_rate: float = 1e-5
     minibatch_size: int = 256
     share: float = 1.0  # of a rollout's windows that an update learns from, drawn at random
@@ -59,7 +61,7 @@ class DiscriminatorConfig:
         )
         ok = self.least_std >= 0
         require(ok, "composite.discriminator.least_std", "at least 0", self.least_std)
-        for name in ("gru_size", "heads", "learning_rate", "minibatch_size"):
+        for name in ("gru_size", "heads", "gradient_norm", "learning_rate", "minibatch_size"):
             value = getattr(self, name)
             require(value > 0, f"composite.discriminator.{name}", "more than 0", value)
         kinds = ("sum", "head")
