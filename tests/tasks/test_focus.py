@@ -46,6 +46,17 @@ def test_weights_follow_the_frontier_of_the_entrys_cell(built):
     np.testing.assert_allclose(weight[CLIP, 0], 1.0, atol=1e-6)
 
 
+def test_even_weights_give_a_style_the_share_of_its_largest_one(built):
+    world = built.world
+    learned = jnp.full_like(focus.first(world.pool), 0.5).at[CLIP, 0, :].set(1.0)
+    plain = focus.weights(learned, world.pool, world.duration, 0.9)
+    even = focus.weights(learned, world.pool, world.duration, 0.9, even=True)
+    np.testing.assert_allclose(even.sum(axis=-1), plain.max(axis=-1), rtol=1e-5)
+    ratio = np.asarray(even / plain)
+    np.testing.assert_allclose(ratio, np.broadcast_to(ratio[..., :1], ratio.shape), rtol=1e-5)
+    assert float(plain.sum(axis=-1)[CLIP, 1]) > 2.0 * float(even.sum(axis=-1)[CLIP, 1])
+
+
 def test_draws_are_in_proportion_to_the_weights():
     weight = jnp.asarray(np.random.default_rng(0).uniform(0.1, 1.0, (3, 2, 4)), jnp.float32)
     kind = jnp.tile(jnp.arange(3), 20_000)

@@ -74,7 +74,9 @@ def draw_starts(
         place = focus.place_of(world.pool, kind, region)
 
         def frontier(learned: jax.Array) -> tuple[jax.Array, jax.Array]:
-            weight = focus.weights(learned, world.pool, world.duration, config.focus)
+            weight = focus.weights(
+                learned, world.pool, world.duration, config.focus, config.focus_even
+            )
             return focus.draw(weight, place, key_row)
 
         getup, row = frontier(learned)

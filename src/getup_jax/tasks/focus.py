@@ -35,10 +35,14 @@ def bin_of(begin: jax.Array) -> jax.Array:
     return jnp.clip(jnp.floor(begin * BINS + 1e-3), 0, BINS - 1).astype(jnp.int32)
 
 
-def weights(learned: jax.Array, pool: Pool, duration: jax.Array, focus: float) -> jax.Array:
+def weights(
+    learned: jax.Array, pool: Pool, duration: jax.Array, focus: float, even: bool = False
+) -> jax.Array:
     """Weight [3 R, G, M] of every entry of the pool's table: 1 - focus + focus * frontier.
 
-    Zero for the styles that cannot start in a region.
+    Zero for the styles that cannot start in a region. With `even`, a style's weights are scaled to
+    the sum of their largest one: else a style of which much succeeds at times is drawn ten times
+    as often as one of which nothing does but the end.
     """
     table = pool.table.reshape(-1, *pool.table.shape[2:])
     part = bin_of(pool.time[table] / duration[:, None])
@@ -47,6 +51,9 @@ def weights(learned: jax.Array, pool: Pool, duration: jax.Array, focus: float) -
     used = jnp.zeros(learned.shape, bool).at[cell].set(True)
     near = frontier(learned, used, pool.table.shape[1])
     weight = 1.0 - focus + focus * jnp.take_along_axis(near, part, axis=-1)
+    if even:
+        scale = jnp.max(weight, axis=-1) / jnp.sum(weight, axis=-1)
+        weight = weight * scale[..., None]
     if pool.startable is None:
         return weight
     order, count = pool.startable.styles, pool.startable.count
