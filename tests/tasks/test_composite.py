@@ -220,6 +220,10 @@ def test_a_growing_cut_is_kept_in_the_state_and_logged(built):
     env = dataclasses.replace(env, config=config)
     state = env.init(built.world, jax.random.key(0), 4)
     assert float(state.cut_s) == 0.5
+    action = jnp.zeros((4, env.action_size))
+    after, stepped = jax.eval_shape(env.step, built.world, state, action)
+    assert jax.tree.structure(after) == jax.tree.structure(state)  # a scan carries it
+    assert stepped.metrics["cut_s"].shape == (4,)
     output = StepOutput(
         observation=state.observation,
         final_observation=state.observation,

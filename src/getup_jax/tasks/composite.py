@@ -156,7 +156,7 @@ class CompositeTask:
         history = jnp.concatenate([state.history[:, 1:], frame[:, None]], axis=1)
         goals, goal_outputs = self.goals.step(key_goals, state.goals, physics.kinematics)
         observation = self._observe(history, goals, physics)
-        state = CompositeState(
+        state = state.replace(
             physics=physics,
             observation=jnp.where(finite[:, None], observation, 0.0),
             history=history,
