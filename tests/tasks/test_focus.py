@@ -36,6 +36,21 @@ def test_the_frontier_is_before_what_is_solved_and_where_success_is_uncertain():
     assert near[LYING, 0, 0] == pytest.approx(0.7)
 
 
+def test_each_region_has_a_frontier_of_its_own_where_curves_start_everywhere():
+    learned = np.zeros((6, 1, focus.BINS), np.float32)  # two regions
+    learned[2 * CLIP] = 1.0
+    used = np.ones(learned.shape, bool)
+    first = np.asarray(focus.frontier(jnp.asarray(learned), jnp.asarray(used), 2))
+    np.testing.assert_allclose(first[2 * LYING : 2 * LYING + 2, 0], 1.0)
+    np.testing.assert_allclose(first[2 * CLIP + 1], 1.0)
+    own = np.asarray(focus.frontier(jnp.asarray(learned), jnp.asarray(used), 2, everywhere=True))
+    np.testing.assert_allclose(own[2 * LYING, 0], 1.0)
+    np.testing.assert_allclose(own[2 * LYING + 1, 0], 0.0)
+    np.testing.assert_allclose(own[2 * CLIP], 0.0)
+    np.testing.assert_allclose(own[2 * CLIP + 1, 0], [0] * (focus.BINS - 2) + [1, 1])
+    np.testing.assert_allclose(own[2 * STANDING + 1], 1.0)
+
+
 def test_weights_follow_the_frontier_of_the_entrys_cell(built):
     pool, duration = built.world.pool, built.world.duration
     learned = focus.first(pool).at[STANDING].set(1.0)

@@ -14,7 +14,7 @@ from getup_jax.nets.prior_data import pose_conditions
 from getup_jax.physics.character import load_character
 from getup_jax.physics.native import NativeEngine
 from getup_jax.physics.surface import link_gaps
-from getup_jax.tasks import region_pool
+from getup_jax.tasks import draws, region_pool
 from getup_jax.tasks.build import assemble
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 
@@ -71,6 +71,28 @@ def test_times_are_those_of_the_kind(uneven):
     np.testing.assert_array_equal(time[LYING], 0.0)
     np.testing.assert_array_equal(time[STANDING, :, 1], 2.0)
     np.testing.assert_array_equal(time[CLIP, 1:], 0.0)  # only the flat region has a clip
+
+
+def test_every_region_has_starts_along_the_clip_if_asked(character, site, cache):
+    task = dataclasses.replace(TASK, clip_everywhere=True)
+    config = dataclasses.replace(CONFIG, task=task, terrain=TERRAIN)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(region_pool, "cache_dir", lambda: cache)
+        built = assemble(config, character, getups(character), neutral_prior(character), print)
+    pool = built.world.pool
+    time = np.asarray(pool.time)[np.asarray(pool.table)]
+    np.testing.assert_array_equal(time[CLIP, 1:], np.repeat(time[CLIP, :1], 3, axis=0))
+    assert time[CLIP, :, 0].max() > 0.0
+    for region in range(1, 4):
+        qpos = np.concatenate([rows(built, CLIP, region, style) for style in range(2)])
+        np.testing.assert_array_equal(site.ground.region(qpos[:, :2]), region)
+        flat = np.concatenate([rows(built, CLIP, 0, style) for style in range(2)])
+        np.testing.assert_allclose(qpos[:, 7:], flat[:, 7:], atol=1e-6)
+    state = built.environment.init(built.world, jax.random.PRNGKey(0), 512)
+    state = state.curriculum.replace(opened=jnp.asarray(4, jnp.int32))
+    kind, region = draws._places(task, jax.random.PRNGKey(0), 2000, state)
+    share = np.asarray(kind == CLIP)[np.asarray(region) > 0].mean()
+    assert share == pytest.approx(task.clip_start, abs=0.04)
 
 
 def test_a_style_that_nothing_fits_is_left_out_of_the_region(uneven, site, cache, monkeypatch):

@@ -22,6 +22,8 @@ class TaskConfig:
     head_clearance_m: float = 0.02  # the head is on the floor below this gap
     stand_start: float = 0.3  # share of episodes that start standing
     clip_start: float = 0.0  # share that starts along the reference clip, or one that fits
+    # on irregular ground too, turned towards its slope and set down on it
+    clip_everywhere: bool = False
     # folder of getup-search, or `authored`, the shipped one; clip starts, if any, are at its states
     paths: str | None = None
     path_share: float = 0.6  # share of the clip starts that are, where there are states

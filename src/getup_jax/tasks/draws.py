@@ -75,7 +75,12 @@ def draw_starts(
 
         def frontier(learned: jax.Array) -> tuple[jax.Array, jax.Array]:
             weight = focus.weights(
-                learned, world.pool, world.duration, config.focus, config.focus_even
+                learned,
+                world.pool,
+                world.duration,
+                config.focus,
+                config.focus_even,
+                config.clip_everywhere,
             )
             return focus.draw(weight, place, key_row)
 
@@ -111,5 +116,6 @@ def _places(
     if progress is None:
         return kind, None
     region = curriculum.draw_region(progress, key_region, num_envs)
-    # only the flat region has starts along a clip
-    return jnp.where((region > 0) & (kind == CLIP), LYING, kind), region
+    if not config.clip_everywhere:
+        kind = jnp.where((region > 0) & (kind == CLIP), LYING, kind)
+    return kind, region

@@ -20,6 +20,7 @@ from getup_jax.physics.settle import settle
 from getup_jax.physics.surface import lift, link_gaps
 from getup_jax.physics.terrain import HeightField
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap
+from getup_jax.tasks.set_down import to_normal
 
 DAMPING = 5.0  # Nms/rad of every hinge of the rag-doll; its servos are off
 _POSE_NOISE_RAD = 0.35
@@ -113,17 +114,9 @@ def _postures(
     lying = Rotation.from_rotvec([0.0, np.pi / 2, 0.0])
     lying = lying * Rotation.from_rotvec(roll[:, None] * vertical)
     heading = Rotation.from_rotvec(rng.uniform(-np.pi, np.pi, (size, 1)) * vertical)
-    turn = _to_normal(normal) * heading * lying
+    turn = to_normal(normal) * heading * lying
     qpos[:, :2], qpos[:, 3:7] = xy, turn.as_quat(scalar_first=True)
     return qpos
-
-
-def _to_normal(normal: np.ndarray) -> Rotation:
-    """The shortest turns of the vertical to unit normals [N, 3]."""
-    axis = np.cross([0.0, 0.0, 1.0], normal)
-    length = np.linalg.norm(axis, axis=1, keepdims=True)
-    angle = np.arctan2(length, normal[:, 2:])
-    return Rotation.from_rotvec(axis / np.maximum(length, 1e-9) * angle)
 
 
 def _come_to_rest(character: CharacterSpec, qpos: np.ndarray) -> np.ndarray:

@@ -36,20 +36,26 @@ def bin_of(begin: jax.Array) -> jax.Array:
 
 
 def weights(
-    learned: jax.Array, pool: Pool, duration: jax.Array, focus: float, even: bool = False
+    learned: jax.Array,
+    pool: Pool,
+    duration: jax.Array,
+    focus: float,
+    even: bool = False,
+    everywhere: bool = False,
 ) -> jax.Array:
     """Weight [3 R, G, M] of every entry of the pool's table: 1 - focus + focus * frontier.
 
     Zero for the styles that cannot start in a region. With `even`, a style's weights are scaled to
     the sum of their largest one: else a style of which much succeeds at times is drawn ten times
-    as often as one of which nothing does but the end.
+    as often as one of which nothing does but the end. everywhere: all regions have starts along the
+    curve.
     """
     table = pool.table.reshape(-1, *pool.table.shape[2:])
     part = bin_of(pool.time[table] / duration[:, None])
     places, styles, _ = part.shape
     cell = (jnp.arange(places)[:, None, None], jnp.arange(styles)[None, :, None], part)
     used = jnp.zeros(learned.shape, bool).at[cell].set(True)
-    near = frontier(learned, used, pool.table.shape[1])
+    near = frontier(learned, used, pool.table.shape[1], everywhere)
     weight = 1.0 - focus + focus * jnp.take_along_axis(near, part, axis=-1)
     if even:
         scale = jnp.max(weight, axis=-1) / jnp.sum(weight, axis=-1)
@@ -61,25 +67,28 @@ def weights(
     return weight * jnp.tile(startable, (pool.table.shape[0], 1))[..., None]
 
 
-def frontier(learned: jax.Array, used: jax.Array, regions: int = 1) -> jax.Array:
+def frontier(
+    learned: jax.Array, used: jax.Array, regions: int = 1, everywhere: bool = False
+) -> jax.Array:
     """How near [3 R, G, BINS] (0 to 1) every cell is to the frontier; used: it has starts.
 
     The larger of 4 p (1 - p) and q - p, where p is the cell's success and q the larger one of the
     next two parts of the curve that have starts: from some starts nothing leads on, and those
     before them must not wait. After the last part comes success itself, and after a lying start
-    what starts along the curve, which only the first region has.
+    what starts along the curve: in its region if they are everywhere, else in the first one.
     """
-    first_clip = CLIP * regions
-    following = after_that = jnp.ones(learned.shape[1:2])
+    first, count = CLIP * regions, regions if everywhere else 1
+    shown, has = learned[first : first + count], used[first : first + count]  # [R or 1, G, BINS]
+    following = after_that = jnp.ones(shown.shape[:2])
     near = []
     for part in reversed(range(BINS)):
         near.append(jnp.maximum(following, after_that))
-        here, has_starts = learned[first_clip, :, part], used[first_clip, :, part]
-        after_that = jnp.where(has_starts, following, after_that)
-        following = jnp.where(has_starts, here, following)
+        after_that = jnp.where(has[..., part], following, after_that)
+        following = jnp.where(has[..., part], shown[..., part], following)
     along = jnp.stack(near[::-1], axis=-1)
-    lying = jnp.broadcast_to(jnp.maximum(following, after_that)[:, None], along.shape)
-    ahead = jnp.repeat(jnp.stack([lying, jnp.ones_like(along), along]), regions, axis=0)
+    lying = jnp.broadcast_to(jnp.maximum(following, after_that)[..., None], along.shape)
+    ahead = jnp.stack([lying, jnp.ones_like(along), along])  # [3, R or 1, G, BINS]
+    ahead = jnp.broadcast_to(ahead, (3, regions, *along.shape[1:])).reshape(learned.shape)
     return jnp.maximum(4.0 * learned * (1.0 - learned), ahead - learned)
 
 

@@ -27,6 +27,7 @@ from getup_jax.tasks.reset_pool import (
     given_actions,
     kind_shares,
 )
+from getup_jax.tasks.set_down import set_down
 from getup_jax.tasks.stances import stand
 from getup_jax.tasks.start_cache import Request, cached_starts
 from getup_jax.types import Engine, PhysicsState
@@ -56,8 +57,8 @@ def build_region_pool(
     """The start states of all regions.
 
     The flat region has those of the flat plane at random places. In the others a style starts
-    from rag-dolls that fell so that their torso angles fit it, or standing; it has no starts along
-    its clip, and one that nothing fits is left out of the region.
+    from rag-dolls that fell so that their torso angles fit it, or standing, and along its clip if
+    `clip_everywhere`; one that no rag-doll fits is left out of the region.
     """
     irregular = _irregular_starts(site, config, log)
     fits = _fits(getups, irregular[LYING], site.character, config)
@@ -80,10 +81,30 @@ def build_region_pool(
                 none = np.full((rows, flat.action_size), np.nan)
                 chosen = irregular[kind].qpos[index], irregular[kind].qvel[index]
                 parts.append(FreeStarts(*chosen, time, none))
-        table[CLIP, region] = table[LYING, region]
+        if config.clip_everywhere:
+            size = sum(len(p) for p in parts)
+            table[CLIP, region] = size + np.arange(len(getups) * rows).reshape(-1, rows)
+            parts.append(_along(parts[0], table[CLIP, 0].ravel(), region, site, rng))
+        else:
+            table[CLIP, region] = table[LYING, region]
     order = np.argsort(~startable, axis=1, kind="stable").astype(np.int32)
     count = startable.sum(axis=1).astype(np.int32)
     return _pool(parts, table, Startable(jnp.asarray(order), jnp.asarray(count)), site, engine)
+
+
+def _along(
+    flat: FreeStarts, index: np.ndarray, region: int, site: Site, rng: np.random.Generator
+) -> FreeStarts:
+    """The flat region's starts of the given rows, set down at random places of another region."""
+    qpos, qvel = set_down(
+        site.character,
+        site.ground.field(),
+        flat.qpos[index],
+        flat.qvel[index],
+        site.ground.draw_spawn(region, len(index), rng),
+        rng.uniform(-np.pi, np.pi, len(index)),
+    )
+    return FreeStarts(qpos, qvel, flat.time[index], flat.action[index])
 
 
 def _pool(
