@@ -11,7 +11,8 @@ from tiny_task import untrained_prior
 
 from eval_samples import SMALL, make_policy, make_task
 from getup_jax import transfer
-from getup_jax.transfer import Units, carry_over
+from getup_jax.tasks.actions import Units
+from getup_jax.transfer import carry_over
 
 KEY = jax.random.PRNGKey(0)
 CONFIG = dataclasses.replace(

@@ -16,7 +16,6 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 import optax
 from flax import struct
 
@@ -28,9 +27,9 @@ from getup_jax.algo.state import PolicyState
 from getup_jax.algo.update import run_minibatches, shuffled_minibatches
 from getup_jax.config import TaskConfig
 from getup_jax.nets import gaussian
-from getup_jax.nets import prior as pose_prior
 from getup_jax.nets.prior import PosePrior
 from getup_jax.tasks import rewards
+from getup_jax.tasks.actions import Units
 from getup_jax.tasks.getup import GetUpTask, World
 
 _ROLLOUTS = 24  # the last one is held out
@@ -40,41 +39,6 @@ _LEARNING_RATES = 1e-3, 1e-5
 # Beside the squared error of the targets (rad^2):
 _NEAR = 0.02  # to the latents that encode the old poses, since others may decode to the same
 _NATURAL = 0.01  # (|dq|_1 / c)^2 of equation 3: what latents can say, offsets should not
-
-
-@dataclasses.dataclass(frozen=True)
-class Units:
-    """What the actions of a policy mean."""
-
-    prior: PosePrior
-    offset_scale: float  # rad of an offset of 1
-
-    def target(self, action: jax.Array, condition: jax.Array) -> jax.Array:
-        """Servo target [..., J] (rad), not clipped, of actions [..., A] under curves [..., 3]."""
-        latent, offset = jnp.split(action, [self.prior.latent_size], axis=-1)
-        pose = pose_prior.decode_action(self.prior, latent, condition)
-        return pose + self.offset_scale * offset
-
-    def action(self, pose: jax.Array, target: jax.Array, condition: jax.Array) -> jax.Array:
-        """The action [..., A] with that target [..., J], its latent being the one of `pose`."""
-        latent = pose_prior.encode_action(self.prior, pose, condition)
-        rest = target - pose_prior.decode_action(self.prior, latent, condition)
-        return jnp.concatenate([latent, rest / self.offset_scale], axis=-1)
-
-    def translate(self, action: jax.Array, condition: jax.Array, new: Units) -> jax.Array:
-        """The action [..., A'] in other units that has the servo target of this one [..., A]."""
-        latent = action[..., : self.prior.latent_size]
-        pose = pose_prior.decode_action(self.prior, latent, condition)
-        return new.action(pose, self.target(action, condition), condition)
-
-    def same(self, other: Units) -> bool:
-        """Whether an action means the same in both."""
-        ours, theirs = (jax.tree.leaves(pose_prior.to_dict(u.prior)) for u in (self, other))
-        return (
-            self.offset_scale == other.offset_scale
-            and len(ours) == len(theirs)
-            and all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
-        )
 
 
 @struct.dataclass
@@ -210,7 +174,7 @@ def _taught(
         _LEARNING_RATES[0], _EPOCHS * updates, _LEARNING_RATES[1] / _LEARNING_RATES[0]
     )
     optimiser = optax.adam(rate)
-    latents, limit = units.prior.latent_size, learner.env.config.offset_limit_rad
+    latents, limit = units.latent_size, learner.env.config.offset_limit_rad
 
     def loss(actor: Any, part: Lesson) -> tuple[jax.Array, dict[str, jax.Array]]:
         seen = normalized(policy, part.observation)
@@ -238,6 +202,6 @@ def _compare(
     """How far the policy's servo targets are from the old ones (degrees, rms), and |dq|_1 (rad)."""
     action = jax.jit(learner.act)(policy, lessons.observation)
     miss = jnp.mean(jnp.square(units.target(action, lessons.condition) - lessons.target))
-    offset = units.offset_scale * action[:, units.prior.latent_size :]
+    offset = units.offset_scale * action[:, units.latent_size :]
     length = jnp.mean(jnp.sum(jnp.abs(offset), axis=-1))
     return math.degrees(math.sqrt(miss)), float(length)

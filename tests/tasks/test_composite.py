@@ -19,7 +19,7 @@ from getup_jax.tasks.build_composite import (
     assemble_composite,
     resampled,
 )
-from getup_jax.tasks.composite import FRAMES, LINK_STATE, observe
+from getup_jax.tasks.link_frames import FRAMES, LINK_STATE, observe
 from getup_jax.tasks.reference_windows import window_at
 from getup_jax.types import StepOutput
 

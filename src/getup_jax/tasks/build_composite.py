@@ -13,15 +13,10 @@ from getup_jax.motion.clips import Clip
 from getup_jax.motion.named_clips import named_clips
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.engine import make_engine
-from getup_jax.tasks.composite import (
-    FRAMES,
-    CompositeTask,
-    CompositeWorld,
-    Starts,
-    link_state,
-)
+from getup_jax.tasks.composite import CompositeTask, CompositeWorld, Starts
 from getup_jax.tasks.goals.combine import equipment_of, make_goals
 from getup_jax.tasks.groups import objective_weights, resolve_groups
+from getup_jax.tasks.link_frames import FRAMES, link_state
 from getup_jax.tasks.reference_windows import make_references, unrolled
 from getup_jax.tasks.references import velocities
 from getup_jax.types import Engine, take

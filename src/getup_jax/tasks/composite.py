@@ -13,7 +13,6 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from getup_jax import rotation
 from getup_jax.config import CompositeConfig
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.rows import replace_rows
@@ -21,11 +20,10 @@ from getup_jax.tasks import cuts
 from getup_jax.tasks.goals.combine import Goals
 from getup_jax.tasks.goals.goal import GoalOutput
 from getup_jax.tasks.groups import Group
+from getup_jax.tasks.link_frames import FRAMES, LINK_STATE, link_state, observe
 from getup_jax.tasks.reference_windows import References, nearest, travel
 from getup_jax.types import Engine, Kinematics, PhysicsState, StepOutput, take
 
-FRAMES = 4  # that the actor sees; a window has the next one too
-LINK_STATE = 13  # position 3, quaternion 4, linear and angular velocity 3 each
 _RESET_CHUNK = 32
 _CUT = 1  # folded into a key, so that tasks without cuts draw what they did
 
@@ -295,34 +293,3 @@ def _count(state: CompositeState, outputs: tuple[GoalOutput, ...]) -> dict[str, 
         "attempts": state.attempts + ended,
         "successes": state.successes + jnp.where(ended, success, 0.0),
     }
-
-
-def link_state(kinematics: Kinematics) -> jax.Array:
-    """One frame of the history [B, L, LINK_STATE]."""
-    return jnp.concatenate(
-        [
-            kinematics.link_position,
-            kinematics.link_quaternion,
-            kinematics.link_linear_velocity,
-            kinematics.link_angular_velocity,
-        ],
-        axis=-1,
-    )
-
-
-def observe(history: jax.Array) -> jax.Array:
-    """The observation [B, F * L * LINK_STATE] of frames [B, F, L, LINK_STATE] [C equation 4].
-
-    All frames are in the heading frame of the newest root, with the origin below it on z = 0.
-    """
-    position, quaternion = history[..., :3], history[..., 3:7]
-    linear, angular = history[..., 7:10], history[..., 10:]
-    origin = position[:, -1:, :1] * jnp.array([1.0, 1.0, 0.0])
-    to_heading = rotation.conjugate(rotation.heading(quaternion[:, -1:, :1]))
-    blocks = [
-        rotation.rotate(to_heading, position - origin),
-        rotation.canonical(rotation.multiply(to_heading, quaternion)),
-        rotation.rotate(to_heading, linear),
-        rotation.rotate(to_heading, angular),
-    ]
-    return jnp.concatenate(blocks, axis=-1).reshape(len(history), -1)

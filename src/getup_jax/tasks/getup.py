@@ -10,13 +10,13 @@ from flax import struct
 
 from getup_jax.config import TaskConfig, TerrainConfig
 from getup_jax.motion import curves
-from getup_jax.nets import prior as pose_prior
 from getup_jax.nets.prior import PosePrior
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain import Ground
 from getup_jax.rotation import angle, conjugate, multiply, rotate
 from getup_jax.rows import replace_rows
 from getup_jax.tasks import assist, curriculum, focus, practice, rewards
+from getup_jax.tasks.actions import Units
 from getup_jax.tasks.draws import Draw, draw_starts
 from getup_jax.tasks.episode import (
     EpisodeState,
@@ -147,7 +147,7 @@ class GetUpTask:
         )
         # The filter keeps most of the last action, so the first target must be the start pose.
         angles = physics.kinematics.qpos[:, 7:]
-        own = self.action_for(world, angles, self.targets(world, state)[:, 0])
+        own = self.units(world).nearest(angles, self.targets(world, state)[:, 0])
         if world.pool.action is not None:
             given = world.pool.action[index]
             own = jnp.where(jnp.isnan(given), own, given)
@@ -212,28 +212,13 @@ class GetUpTask:
 
     def servo_target(self, world: World, state: EpisodeState, filtered: jax.Array) -> jax.Array:
         """Hinge targets [B, J]: q = decoder(z, c) + dq [P 3.4], c the curve values now."""
-        latent, offset = jnp.split(filtered, [self.latent_size], axis=-1)
-        if world.prior is None:
-            pose = self._neutral()
-        else:
-            condition = self.targets(world, state)[:, 0]
-            pose = pose_prior.decode_action(world.prior, latent, condition)
-        target = pose + self.config.offset_scale * offset
+        target = self.units(world).target(filtered, self.targets(world, state)[:, 0])
         return jnp.clip(target, world.target_lower, world.target_upper)
 
-    def action_for(self, world: World, angles: jax.Array, condition: jax.Array) -> jax.Array:
-        """The action [B, A] whose servo target is the pose angles [B, J], as near as it gets.
-
-        condition [B, 3]: the curve values at that time.
-        """
-        if world.prior is None:
-            return (angles - self._neutral()) / self.config.offset_scale
-        latent = pose_prior.encode_action(world.prior, angles, condition)
-        return jnp.concatenate([latent, jnp.zeros_like(angles)], axis=-1)
-
-    def _neutral(self) -> jax.Array:
-        """Hinge angles [J] of the neutral pose."""
-        return jnp.asarray(self.character.neutral_qpos[7:], jnp.float32)
+    def units(self, world: World) -> Units:
+        """What the actions mean."""
+        neutral = jnp.asarray(self.character.neutral_qpos[7:], jnp.float32)
+        return Units(world.prior, self.config.offset_scale, neutral)
 
     def _region_of(self, region: jax.Array | None, getup: jax.Array) -> jax.Array | None:
         """The state's region [B]: None on a flat plane, the first one where none is given."""

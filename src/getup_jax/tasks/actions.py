@@ -1,0 +1,78 @@
+"""What an action of the get-up task means: a latent pose and an offset for every hinge [P 3.4]."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from getup_jax.nets import prior as pose_prior
+from getup_jax.nets.prior import PosePrior
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Units:
+    """From actions to servo targets, q = decoder(z, c) + scale * offset, and back."""
+
+    prior: PosePrior | None  # None: offsets alone, from `neutral`
+    offset_scale: float  # rad of an offset of 1
+    neutral: jax.Array | None = None  # [J] rad; only without a prior
+
+    @property
+    def latent_size(self) -> int:
+        """Z, the first numbers of an action."""
+        return 0 if self.prior is None else self.prior.latent_size
+
+    def pose(self, action: jax.Array, condition: jax.Array) -> jax.Array:
+        """Hinge angles [..., J] (rad) that the latent parts of actions [..., A] stand for.
+
+        condition [..., 3]: the curve values at that time.
+        """
+        if self.prior is None:
+            assert self.neutral is not None
+            return self.neutral
+        return pose_prior.decode_action(self.prior, action[..., : self.latent_size], condition)
+
+    def target(self, action: jax.Array, condition: jax.Array) -> jax.Array:
+        """Servo target [..., J] (rad), not clipped, of actions [..., A] under curves [..., 3]."""
+        offset = action[..., self.latent_size :]
+        return self.pose(action, condition) + self.offset_scale * offset
+
+    def action(self, pose: jax.Array, target: jax.Array, condition: jax.Array) -> jax.Array:
+        """The action [..., A] with that target [..., J], its latent being the one of `pose`."""
+        latent = self.latent(pose, condition)
+        rest = target - self.pose(latent, condition)
+        return jnp.concatenate([latent, rest / self.offset_scale], axis=-1)
+
+    def nearest(self, angles: jax.Array, condition: jax.Array) -> jax.Array:
+        """The action [..., A] whose target is the pose angles [..., J], as near as latents get.
+
+        Exactly, by offsets, where there is no prior; by the latent pose alone where there is one.
+        """
+        if self.prior is None:
+            return self.action(angles, angles, condition)
+        latent = self.latent(angles, condition)
+        return jnp.concatenate([latent, jnp.zeros_like(angles)], axis=-1)
+
+    def latent(self, angles: jax.Array, condition: jax.Array) -> jax.Array:
+        """The latent parts [..., Z] that the prior encodes poses [..., J] by."""
+        if self.prior is None:
+            return angles[..., :0]
+        return pose_prior.encode_action(self.prior, angles, condition)
+
+    def translate(self, action: jax.Array, condition: jax.Array, new: Units) -> jax.Array:
+        """The action [..., A'] in other units that has the servo target of this one [..., A]."""
+        return new.action(self.pose(action, condition), self.target(action, condition), condition)
+
+    def same(self, other: Units) -> bool:
+        """Whether an action means the same in both."""
+        if self.offset_scale != other.offset_scale:
+            return False
+        ours, theirs = (jax.tree.leaves(_arrays(units)) for units in (self, other))
+        return len(ours) == len(theirs) and all(map(np.array_equal, ours, theirs))
+
+
+def _arrays(units: Units) -> object:
+    return units.neutral if units.prior is None else pose_prior.to_dict(units.prior)
