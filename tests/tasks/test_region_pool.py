@@ -175,6 +175,14 @@ def test_heights_are_above_the_mean_of_the_height_map(uneven, site):
     assert np.ptp(np.asarray(posture.height_map), axis=1).min() > 0.05  # it is not flat
 
 
+def test_the_first_servo_target_is_the_start_pose_itself(uneven):
+    env, world = uneven.environment, uneven.world
+    state = at(uneven, STANDING, 3)
+    pose = np.asarray(state.physics.kinematics.qpos)[:, 7:]
+    np.testing.assert_allclose(env.servo_target(world, state, state.action), pose, atol=1e-5)
+    assert np.abs(np.asarray(state.action)[:, -env.character.num_joints :]).max() > 0.1
+
+
 def test_the_head_is_on_the_floor_where_it_touches_the_slope(uneven, site):
     env, field = uneven.environment, site.ground.field()
     state = at(uneven, LYING, 3)

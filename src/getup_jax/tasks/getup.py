@@ -147,7 +147,11 @@ class GetUpTask:
         )
         # The filter keeps most of the last action, so the first target must be the start pose.
         angles = physics.kinematics.qpos[:, 7:]
-        own = self.units(world).nearest(angles, self.targets(world, state)[:, 0])
+        condition, units = self.targets(world, state)[:, 0], self.units(world)
+        if self.terrain is None:
+            own = units.nearest(angles, condition)
+        else:  # the prior knows no feet turned to a slope: without offsets, they would push it over
+            own = units.action(angles, angles, condition)
         if world.pool.action is not None:
             given = world.pool.action[index]
             own = jnp.where(jnp.isnan(given), own, given)
