@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -173,3 +175,15 @@ def test_the_height_feature_is_above_the_mean_ground(observer, engine, character
     ramp = observe(observer, standing(engine, character, x=2.0), Ramp())["features"]
     np.testing.assert_allclose(flat[:, 0] - ramp[:, 0], 0.2, atol=1e-5)
     np.testing.assert_allclose(flat[:, 1:], ramp[:, 1:], atol=1e-6)
+
+
+def test_relief_is_seen_larger_and_a_plane_as_it_is(engine, character, observer):
+    larger = dataclasses.replace(observer, relief_gain=4.0)
+    kinematics = standing(engine, character)
+    plain, seen = observe(observer, kinematics, Ramp()), observe(larger, kinematics, Ramp())
+    mean = plain["height_map"].mean()
+    expected = mean + 4.0 * (plain["height_map"] - mean)
+    np.testing.assert_allclose(seen["height_map"], expected, atol=1e-5)
+    np.testing.assert_array_equal(seen["features"], plain["features"])
+    flat = observe(larger, kinematics)["height_map"]
+    np.testing.assert_allclose(flat, observe(observer, kinematics)["height_map"], atol=1e-6)

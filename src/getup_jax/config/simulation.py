@@ -53,6 +53,9 @@ class TerrainConfig:
     rough_m: tuple[float, ...] = (0.06, 0.13, 0.2)  # its corners move up or down by at most this
     slope_deg: tuple[float, ...] = (10.0, 20.0, 30.0)  # steepest slope of easy, medium, hard
     slope_block_m: float = 12.0  # diameter of a hill or hollow
+    # times the differences within the height map that the policy sees: a body's height over the
+    # ground varies by .35 m (std), the ground below it on a slope of 10 degrees by .05 m
+    relief_gain: float = 4.0
     drops: int = 5000  # rag-dolls dropped on the irregular regions for lying starts
     curriculum: str = "success"  # what opens the next region: success | schedule | none (all open)
     unlock_successes: int = 200  # success: this many in the newest region
@@ -70,6 +73,7 @@ class TerrainConfig:
             require(ok, f"terrain.{name}", expected, values)
         ok = max(self.slope_deg) <= 60
         require(ok, "terrain.slope_deg", "at most 60 degrees", self.slope_deg)
+        require(self.relief_gain > 0, "terrain.relief_gain", "more than 0", self.relief_gain)
         kinds = ("success", "schedule", "none")
         ok = self.curriculum in kinds
         require(ok, "terrain.curriculum", f"one of {kinds}", self.curriculum)

@@ -84,7 +84,12 @@ def assemble(
     task = GetUpTask(
         engine=engine,
         character=on_ground,
-        observer=Observer.of(character, len(config.task.lookahead_s), action_size),
+        observer=Observer.of(
+            character,
+            len(config.task.lookahead_s),
+            action_size,
+            1.0 if config.terrain is None else config.terrain.relief_gain,
+        ),
         config=config.task,
         latent_size=latent_size,
         terrain=config.terrain,

@@ -38,9 +38,16 @@ class Observer:
     parents: tuple[int, ...]  # of the links 1 ... L - 1
     links: FeatureLinks
     table: tuple[tuple[str, int], ...]  # (name, size) in order: the only definition of the layout
+    relief_gain: float = 1.0  # times the differences within the height map
 
     @classmethod
-    def of(cls, character: CharacterSpec, num_lookahead: int, action_size: int) -> Observer:
+    def of(
+        cls,
+        character: CharacterSpec,
+        num_lookahead: int,
+        action_size: int,
+        relief_gain: float = 1.0,
+    ) -> Observer:
         """The layout for a character, a number of look-ahead targets and an action."""
         joints = len(character.link_names) - 1
         table = (
@@ -54,7 +61,8 @@ class Observer:
             ("action", action_size),
         )
         parents = tuple(int(i) - 1 for i in character.model.body_parentid[2:])
-        return cls(parents=parents, links=FeatureLinks.of(character), table=table)
+        links = FeatureLinks.of(character)
+        return cls(parents=parents, links=links, table=table, relief_gain=relief_gain)
 
     @property
     def size(self) -> int:
@@ -95,6 +103,9 @@ class Observer:
         blocks = {
             name: getattr(posture, name) for name, _ in self.table if hasattr(posture, name)
         } | {"targets": targets, "action": action}
+        if self.relief_gain != 1.0:
+            mean = jnp.mean(posture.height_map, axis=-1, keepdims=True)
+            blocks["height_map"] = mean + self.relief_gain * (posture.height_map - mean)
         flat = [blocks[name].reshape(len(action), size) for name, size in self.table]
         return jnp.concatenate(flat, axis=-1)
 
