@@ -15,6 +15,7 @@ from getup_jax.algo.objectives import make_objectives
 from getup_jax.algo.state import PolicyState
 from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.config import Config
+from getup_jax.footing import teach_footing
 from getup_jax.loop import CarryOver, Job, Loop, TrainingError, num_iterations, steps_per_iteration
 from getup_jax.metrics import MetricsWriter, tensorboard_module
 from getup_jax.nets import prior as pose_prior
@@ -59,7 +60,10 @@ def _carry_over(learner: Learner, world: World, seed: int) -> CarryOver:
                 "one; set prior: null, or start from another policy"
             )
         prior, key = pose_prior.from_dict(loaded.prior), jax.random.PRNGKey(seed)
-        return transfer.carry_over(learner, world, policy, loaded.config.task, prior, key, log)
+        policy = transfer.carry_over(learner, world, policy, loaded.config.task, prior, key, log)
+        if learner.env.terrain is None or loaded.config.terrain is not None:
+            return policy
+        return teach_footing(learner, world, policy, key, log)
 
     return carry_over
 

@@ -10,45 +10,22 @@ the units of the new one.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable
-from typing import Any
 
 import jax
 import jax.numpy as jnp
-import optax
-from flax import struct
 
+from getup_jax import lessons
 from getup_jax.algo import normalize
-from getup_jax.algo.actor_critic import normalized
 from getup_jax.algo.learner import Learner
-from getup_jax.algo.rollout import rollout
 from getup_jax.algo.state import PolicyState
-from getup_jax.algo.update import run_minibatches, shuffled_minibatches
 from getup_jax.config import TaskConfig
-from getup_jax.nets import gaussian
+from getup_jax.lessons import Lesson
 from getup_jax.nets.prior import PosePrior
-from getup_jax.tasks import rewards
 from getup_jax.tasks.actions import Units
 from getup_jax.tasks.getup import GetUpTask, World
 
 _ROLLOUTS = 24  # the last one is held out
-_NOISE = 0.2  # standard deviation of the actions, to see what is beside the way, too
-_EPOCHS, _MINIBATCH = 30, 1024
-_LEARNING_RATES = 1e-3, 1e-5
-# Beside the squared error of the targets (rad^2):
-_NEAR = 0.02  # to the latents that encode the old poses, since others may decode to the same
-_NATURAL = 0.01  # (|dq|_1 / c)^2 of equation 3: what latents can say, offsets should not
-
-
-@struct.dataclass
-class Lesson:
-    """N observations and what to do there; a pytree of [N, ...]."""
-
-    observation: jax.Array  # [N, O] raw, its action in the new units
-    action: jax.Array  # [N, A] in the new units
-    target: jax.Array  # [N, J] servo target (rad)
-    condition: jax.Array  # [N, 3]
 
 
 def carry_over(
@@ -82,17 +59,15 @@ def carry_over(
         return policy
     log("its pose prior or its offsets are others: teaching the actor those of this run ...")
     key_roll, key_order = jax.random.split(key)
-    lessons = _lessons(learner, env, world, policy, (old, new), key_roll)
-    size = len(lessons.observation) // _ROLLOUTS
-    training = jax.tree.map(lambda x: x[:-size], lessons)
-    heldout = jax.tree.map(lambda x: x[-size:], lessons)
+    seen = _lessons(learner, env, world, policy, (old, new), key_roll)
+    training, heldout = lessons.held_out(seen, len(seen.observation) // _ROLLOUTS)
     block = env.observer.slices()["action"]
     policy = dataclasses.replace(
-        policy, statistics=_restated(policy.statistics, lessons.observation, block)
+        policy, statistics=_restated(policy.statistics, seen.observation, block)
     )
-    before, _ = _compare(learner, policy, new, heldout)
-    policy = _taught(learner, policy, new, training, key_order)
-    after, offsets = _compare(learner, policy, new, heldout)
+    before, _ = lessons.compare(learner, policy, new, heldout)
+    policy = lessons.taught(learner, policy, new, training, key_order)
+    after, offsets = lessons.compare(learner, policy, new, heldout)
     log(
         f"its servo targets differ by {after:.2f} degrees (rms) now, {before:.1f} before; "
         f"offsets |dq|_1 {offsets:.1f} rad"
@@ -108,18 +83,11 @@ def _lessons(
     units: tuple[Units, Units],
     key: jax.Array,
 ) -> Lesson:
-    """What the old policy does on the new task, in rollouts that go on from one to the next."""
+    """What the old policy does on the new task."""
     (old, new), slices = units, env.observer.slices()
     config = dataclasses.replace(env.config, offset_scale=old.offset_scale, paths=None)
     env = dataclasses.replace(env, config=config)
     world = world.replace(prior=old.prior, pool=world.pool.replace(action=None))
-    num_envs, num_steps = learner.config.num_envs, learner.config.num_steps
-
-    def act(observation: jax.Array, key_action: jax.Array):
-        mean = learner.act(policy, observation)
-        std = jnp.full_like(mean, _NOISE)
-        action = gaussian.sample(key_action, mean, std)
-        return action, gaussian.log_prob(action, mean, std)
 
     def lesson(observation: jax.Array) -> Lesson:
         condition = observation[..., slices["targets"]][..., :3]
@@ -132,20 +100,7 @@ def _lessons(
             condition=condition,
         )
 
-    @jax.jit
-    def collect(world: World, state: Any, key: jax.Array) -> tuple[Any, Lesson]:
-        collected = rollout(env, world, state, act, key, num_steps)
-        observation = collected.transition.observation
-        flat = observation.reshape(-1, observation.shape[-1])
-        return collected.environment, lesson(flat)
-
-    keys = jax.random.split(key, _ROLLOUTS + 1)
-    state = env.init(world, keys[0], num_envs)
-    parts = []
-    for key_roll in keys[1:]:
-        state, part = collect(world, state, key_roll)
-        parts.append(jax.device_get(part))
-    return jax.tree.map(lambda *x: jnp.concatenate(x), *parts)
+    return lessons.watched(learner, env, world, policy, lesson, _ROLLOUTS, key)
 
 
 def _restated(
@@ -161,47 +116,3 @@ def _restated(
             for name in ("mean", "residue", "variance")
         }
     )
-
-
-def _taught(
-    learner: Learner, policy: PolicyState, units: Units, lessons: Lesson, key: jax.Array
-) -> PolicyState:
-    """The policy after regression of its targets, with latents as far as they can say them."""
-    count = len(lessons.observation)
-    size = min(_MINIBATCH, count)
-    updates = count // size
-    rate = optax.cosine_decay_schedule(
-        _LEARNING_RATES[0], _EPOCHS * updates, _LEARNING_RATES[1] / _LEARNING_RATES[0]
-    )
-    optimiser = optax.adam(rate)
-    latents, limit = units.latent_size, learner.env.config.offset_limit_rad
-
-    def loss(actor: Any, part: Lesson) -> tuple[jax.Array, dict[str, jax.Array]]:
-        seen = normalized(policy, part.observation)
-        action = learner.model.mean(actor, seen)
-        miss = jnp.mean(jnp.square(units.target(action, part.condition) - part.target))
-        (latent, offset), (near, _) = (jnp.split(a, [latents], -1) for a in (action, part.action))
-        far = jnp.mean(jnp.square(latent - near))
-        unnatural = jnp.mean(1.0 - rewards.natural(units.offset_scale * offset, limit))
-        return miss + _NEAR * far + _NATURAL * unnatural, {"miss": miss}
-
-    @jax.jit
-    def epoch(carry: tuple[Any, Any], key: jax.Array) -> tuple[Any, Any]:
-        order = shuffled_minibatches(key, 1, updates * size, size)
-        return run_minibatches(loss, optimiser, *carry, lessons, order)[:2]
-
-    carry = (policy.actor, optimiser.init(policy.actor))
-    for key_epoch in jax.random.split(key, _EPOCHS):
-        carry = epoch(carry, key_epoch)
-    return dataclasses.replace(policy, actor=carry[0])
-
-
-def _compare(
-    learner: Learner, policy: PolicyState, units: Units, lessons: Lesson
-) -> tuple[float, float]:
-    """How far the policy's servo targets are from the old ones (degrees, rms), and |dq|_1 (rad)."""
-    action = jax.jit(learner.act)(policy, lessons.observation)
-    miss = jnp.mean(jnp.square(units.target(action, lessons.condition) - lessons.target))
-    offset = units.offset_scale * action[:, units.latent_size :]
-    length = jnp.mean(jnp.sum(jnp.abs(offset), axis=-1))
-    return math.degrees(math.sqrt(miss)), float(length)

@@ -1,0 +1,98 @@
+"""Teaches a policy that knows only flat ground to stand on slopes, before it trains there.
+
+On a plane the height map says one number 25 times, and feet are never turned to the ground: PPO has
+to find what the map's differences mean while every standing start falls within a second. Standing
+starts on irregular ground have soles on the slope, and hold that pose for a second under their own
+servos. So the actor is taught, by regression, to name that pose there, and what it did before on
+the flat.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from getup_jax import lessons
+from getup_jax.algo.learner import Learner
+from getup_jax.algo.state import PolicyState
+from getup_jax.lessons import Lesson, Log
+from getup_jax.tasks.episode import STANDING, EpisodeState
+from getup_jax.tasks.getup import GetUpTask, World
+
+_OWN, _HELD = 6, 8  # rollouts of the policy on the flat, and batches of poses that are held
+_HOLD_STEPS, _LOOK_STEPS = 60, 3  # how long they are, and how often a lesson is taken from it
+_PUSH, _PUSH_STEPS = 0.3, 20  # standard deviation of all actions, kept for so many steps
+_FLAT_ONLY = {"curriculum": "success", "unlock_successes": 10**9}  # nothing else opens
+_SUNK_M = 0.1  # of the neck: from there on it falls
+
+
+def teach_footing(
+    learner: Learner, world: World, policy: PolicyState, key: jax.Array, log: Log
+) -> PolicyState:
+    """The policy with an actor that turns its feet to the slope where it stands."""
+    env = learner.env
+    assert isinstance(env, GetUpTask)
+    assert env.terrain is not None
+    units, slices = env.units(world), env.observer.slices()
+    log("it has trained on a plane: teaching it to stand on slopes ...")
+    keys = jax.random.split(key, _HELD + 2)
+
+    def as_it_is(observation: jax.Array) -> Lesson:
+        condition = observation[..., slices["targets"]][..., :3]
+        action = learner.act(policy, observation)
+        return Lesson(observation, action, units.target(action, condition), condition)
+
+    plane = dataclasses.replace(env, terrain=dataclasses.replace(env.terrain, **_FLAT_ONLY))
+    own = lessons.watched(learner, plane, world, policy, as_it_is, _OWN, keys[0])
+    held = [_held(learner, env, world, k) for k in keys[2:]]
+    training = lessons.join([own, *held[:-1]])
+    before, _ = lessons.compare(learner, policy, units, held[-1])
+    policy = lessons.taught(learner, policy, units, training, keys[1])
+    after, _ = lessons.compare(learner, policy, units, held[-1])
+    flat, _ = lessons.compare(learner, policy, units, own)
+    log(
+        f"its servo targets on slopes miss the held pose by {after:.2f} degrees (rms), "
+        f"{before:.1f} before; on the flat they moved by {flat:.2f}"
+    )
+    return policy
+
+
+def _held(learner: Learner, env: GetUpTask, world: World, key: jax.Array) -> Lesson:
+    """Standing poses on irregular ground, swaying as their servo targets are pushed about."""
+    observation, action = jax.device_get(_sway(learner.config.num_envs, env, world, key))
+    height = observation[..., env.observer.slices()["features"]][..., 0]
+    stands = np.abs(height - height[:1]) < _SUNK_M
+    observation, action = observation[stands], action[stands]
+    condition = observation[..., env.observer.slices()["targets"]][..., :3]
+    target = env.units(world).target(jnp.asarray(action), jnp.asarray(condition))
+    return Lesson(*map(jnp.asarray, (observation, action, target, condition)))
+
+
+def _sway(size: int, env: GetUpTask, world: World, key: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Observations [T, B, O], and the actions [T, B, A] that hold the pose of the start."""
+    _, regions, styles, rows = world.pool.table.shape
+    keys = jax.random.split(key, 4)
+    state = env.start(
+        world,
+        jax.random.randint(keys[0], (size,), 0, styles),
+        jnp.full(size, STANDING, jnp.int32),
+        jax.random.randint(keys[1], (size,), 0, rows),
+        region=jax.random.randint(keys[2], (size,), 1, regions),
+    )
+    hold, seen = state.action, []
+    for index, key_push in enumerate(jax.random.split(keys[3], _HOLD_STEPS)):
+        if index % _PUSH_STEPS == 0:
+            push = _PUSH * jax.random.normal(key_push, hold.shape)
+        if index % _LOOK_STEPS == 0:
+            seen.append(state.observation)
+        state = _step(env, world, state, hold + push)
+    return jnp.stack(seen), jnp.broadcast_to(hold, (len(seen), *hold.shape))
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _step(env: GetUpTask, world: World, state: EpisodeState, action: jax.Array) -> EpisodeState:
+    return env.advance(world, state, action)[0]
