@@ -10,7 +10,7 @@ import pytest
 from tiny_task import untrained_prior
 
 from eval_samples import SMALL, make_policy, make_task
-from getup_jax import transfer
+from getup_jax import lessons, transfer
 from getup_jax.tasks.actions import Units
 from getup_jax.transfer import carry_over
 
@@ -70,8 +70,8 @@ def test_an_action_that_means_the_same_leaves_the_policy_alone(task):
 
 def test_the_actor_learns_the_old_targets(task, old, monkeypatch):
     monkeypatch.setattr(transfer, "_ROLLOUTS", 8)
-    monkeypatch.setattr(transfer, "_EPOCHS", 60)
-    monkeypatch.setattr(transfer, "_MINIBATCH", 64)
+    monkeypatch.setattr(lessons, "_EPOCHS", 60)
+    monkeypatch.setattr(lessons, "_MINIBATCH", 64)
     learner, policy = make_policy(task, CONFIG)
     settings = dataclasses.replace(CONFIG.task, offset_scale=old.offset_scale)
     log: list[str] = []
@@ -89,12 +89,12 @@ def test_the_actor_learns_the_old_targets(task, old, monkeypatch):
 
 def test_offsets_are_avoided_where_latents_can_say_the_same(task, monkeypatch):
     monkeypatch.setattr(transfer, "_ROLLOUTS", 8)
-    monkeypatch.setattr(transfer, "_EPOCHS", 60)
-    monkeypatch.setattr(transfer, "_MINIBATCH", 64)
+    monkeypatch.setattr(lessons, "_EPOCHS", 60)
+    monkeypatch.setattr(lessons, "_MINIBATCH", 64)
     learner, policy = make_policy(task, CONFIG)
     lengths = []
     for weight in (0.0, 1.0):
-        monkeypatch.setattr(transfer, "_NATURAL", weight)
+        monkeypatch.setattr(lessons, "_NATURAL", weight)
         log: list[str] = []
         settings = dataclasses.replace(CONFIG.task, offset_scale=0.5)
         prior = untrained_prior(task.environment.character, seed=0)
@@ -108,5 +108,5 @@ def test_the_difference_is_the_root_mean_square_in_degrees(task, old):
     action, condition = samples(np.random.default_rng(2), 4)
     observation = jnp.ones((4, learner.env.observation_size))
     target = old.target(learner.act(policy, observation), condition) + math.radians(3.0)
-    lessons = transfer.Lesson(observation, action, target, condition)
-    assert transfer._compare(learner, policy, old, lessons)[0] == pytest.approx(3.0, rel=1e-3)
+    lesson = lessons.Lesson(observation, action, target, condition)
+    assert lessons.compare(learner, policy, old, lesson)[0] == pytest.approx(3.0, rel=1e-3)

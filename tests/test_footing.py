@@ -1,0 +1,55 @@
+"""A policy of the flat plane is taught to stand on slopes."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+from ground_samples import TERRAIN
+from tiny_task import CONFIG, getups, neutral_prior
+
+from getup_jax import footing, lessons
+from getup_jax.algo.learner import make_learner
+from getup_jax.config import NetworkConfig, PPOConfig
+from getup_jax.physics.character import load_character
+from getup_jax.tasks import region_pool
+from getup_jax.tasks.build import assemble
+
+PPO = PPOConfig(num_envs=16, num_steps=8, minibatch_size=64)
+TASK = dataclasses.replace(CONFIG.task, pool_size=96, stand_start=0.5)
+KEY = jax.random.PRNGKey(0)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(region_pool, "cache_dir", lambda: tmp_path_factory.mktemp("starts"))
+        character = load_character(CONFIG.physics)
+        config = dataclasses.replace(CONFIG, task=TASK, terrain=TERRAIN)
+        prior = neutral_prior(character)
+        task = assemble(config, character, getups(character), prior, lambda text: None)
+    return task, make_learner(task.environment, NetworkConfig((64,)), PPO, total_steps=1000)
+
+
+def test_held_poses_are_those_of_the_starts_and_stand(built):
+    task, learner = built
+    lesson = footing._held(learner, task.environment, task.world, KEY)
+    height = np.asarray(lesson.observation)[:, task.environment.observer.slices()["features"]][:, 0]
+    assert 16 < len(height) <= 16 * footing._HOLD_STEPS // footing._LOOK_STEPS
+    assert np.ptp(height) < 0.4
+    angles = np.asarray(task.world.pool.physics.kinematics.qpos)[:, 7:]
+    gap = np.abs(np.asarray(lesson.target)[:, None] - angles).max(axis=-1).min(axis=1)
+    np.testing.assert_allclose(gap, 0.0, atol=1e-4)
+
+
+def test_the_actor_learns_the_held_poses_and_keeps_the_rest(built, monkeypatch):
+    monkeypatch.setattr(lessons, "_MINIBATCH", 64)
+    task, learner = built
+    policy = learner.init_learner(KEY).policy
+    log: list[str] = []
+    footing.teach_footing(learner, task.world, policy, KEY, log.append)
+    after, before, flat = (float(word) for word in log[-1].split() if word[0].isdigit())
+    assert after < 0.6 * before
+    assert flat < after
