@@ -111,6 +111,17 @@ def test_an_export_is_a_small_policy_with_a_card(run_folder, results, tmp_path, 
     assert "Curves that succeed in less than 80%: clip (0%), curve (0%)." in card
 
 
+def test_a_card_has_a_row_a_region(run_folder, results, tmp_path):
+    found = json.loads(results.read_text())
+    found["conditions"]["terrain_seed"] = 7
+    found["per_region"] = {"hard": found | {"success": 0.25}}
+    file = tmp_path / "regions.json"
+    file.write_text(json.dumps(found))
+    card = (export.export(run_folder, tmp_path / "tiny", [file]) / CARD).read_text()
+    assert "ground of seed 7; 1.5 s of standing" in card
+    assert "| region hard | 25.0% (0.0% - 56.1%) |" in card
+
+
 def test_an_export_can_be_made_again_and_says_what_is_unknown(run_folder, tmp_path):
     for _ in range(2):
         out = export.export(load_policy(run_folder).path, tmp_path / "tiny")

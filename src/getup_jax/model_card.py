@@ -83,8 +83,9 @@ def _training(loaded: LoadedPolicy, provenance: Provenance) -> dict[str, str]:
 
 
 def _numbers(result: Mapping[str, Any]) -> str:
-    """One evaluation: its conditions, then a table of everything, each way of lying, the worst."""
-    rows = {"all": result, **(result.get("per_orientation") or {})}
+    """One evaluation: its conditions, then all of it, each region and way of lying, the worst."""
+    regions = {f"region {name}": row for name, row in (result.get("per_region") or {}).items()}
+    rows = {"all": result, **regions, **(result.get("per_orientation") or {})}
     curves = result.get("per_curve") or {}
     if curves:
         worst = min(curves, key=lambda name: curves[name]["success"])
@@ -116,6 +117,8 @@ def _conditions(of: Mapping[str, Any]) -> str:
     low, high = of["duration_scale"]
     parts = [f"{of['start'].capitalize()} starts", f"seed {of['seed']}", f"engine {of['engine']}"]
     parts += [f"joint noise {of['start_noise_rad']:g} rad", f"durations T x U({low:g}, {high:g})"]
+    if of.get("terrain_seed") is not None:
+        parts.append(f"ground of seed {of['terrain_seed']}")
     if of["blend"] is not None:
         parts.append(f"mixtures of two curves ({of['blend']})")
     if of["push_ns"] is not None:
