@@ -118,7 +118,7 @@ def test_a_card_has_a_row_a_region(run_folder, results, tmp_path):
     file = tmp_path / "regions.json"
     file.write_text(json.dumps(found))
     card = (export.export(run_folder, tmp_path / "tiny", [file]) / CARD).read_text()
-    assert "ground of seed 7; 1.5 s of standing" in card
+    assert "U(0.8, 1.2), ground of seed 7" in card
     assert "| region hard | 25.0% (0.0% - 56.1%) |" in card
 
 
