@@ -83,7 +83,7 @@ def _sway(size: int, env: GetUpTask, world: World, key: jax.Array) -> tuple[jax.
         jax.random.randint(keys[1], (size,), 0, rows),
         region=jax.random.randint(keys[2], (size,), 1, regions),
     )
-    hold, seen = state.action, []
+    hold, push, seen = state.action, jnp.zeros_like(state.action), []
     for index, key_push in enumerate(jax.random.split(keys[3], _HOLD_STEPS)):
         if index % _PUSH_STEPS == 0:
             push = _PUSH * jax.random.normal(key_push, hold.shape)
