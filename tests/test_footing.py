@@ -46,6 +46,7 @@ def test_held_poses_are_those_of_the_starts_and_stand(built):
 
 def test_the_actor_learns_the_held_poses_and_keeps_the_rest(built, monkeypatch):
     monkeypatch.setattr(lessons, "_MINIBATCH", 64)
+    monkeypatch.setattr(footing, "_HELD", 3)
     task, learner = built
     policy = learner.init_learner(KEY).policy
     log: list[str] = []
