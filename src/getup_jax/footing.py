@@ -37,12 +37,12 @@ def teach_footing(
     env = learner.env
     assert isinstance(env, GetUpTask)
     assert env.terrain is not None
-    units, slices = env.units(world), env.observer.slices()
+    units = env.units(world)
     log("it has trained on a plane: teaching it to stand on slopes ...")
     keys = jax.random.split(key, _HELD + 2)
 
     def as_it_is(observation: jax.Array) -> Lesson:
-        condition = observation[..., slices["targets"]][..., :3]
+        condition = env.observer.condition(observation)
         action = learner.act(policy, observation)
         return Lesson(observation, action, units.target(action, condition), condition)
 
@@ -66,10 +66,9 @@ def _held(learner: Learner, env: GetUpTask, world: World, key: jax.Array) -> Les
     observation, action = jax.device_get(_sway(learner.config.num_envs, env, world, key))
     height = observation[..., env.observer.slices()["features"]][..., 0]
     stands = np.abs(height - height[:1]) < _SUNK_M
-    observation, action = observation[stands], action[stands]
-    condition = observation[..., env.observer.slices()["targets"]][..., :3]
-    target = env.units(world).target(jnp.asarray(action), jnp.asarray(condition))
-    return Lesson(*map(jnp.asarray, (observation, action, target, condition)))
+    observation, action = jnp.asarray(observation[stands]), jnp.asarray(action[stands])
+    condition = env.observer.condition(observation)
+    return Lesson(observation, action, env.units(world).target(action, condition), condition)
 
 
 def _sway(size: int, env: GetUpTask, world: World, key: jax.Array) -> tuple[jax.Array, jax.Array]:

@@ -36,8 +36,8 @@ _NATURAL = 0.01  # (|dq|_1 / c)^2 of equation 3: what latents can say, offsets s
 class Lesson:
     """N observations and what to do there; a pytree of [N, ...]."""
 
-    observation: jax.Array  # [N, O] raw, its action in the new units
-    action: jax.Array  # [N, A] in the new units
+    observation: jax.Array  # [N, O] raw, its action in the units of the policy that learns
+    action: jax.Array  # [N, A] likewise
     target: jax.Array  # [N, J] servo target (rad)
     condition: jax.Array  # [N, 3]
 
@@ -126,7 +126,7 @@ def taught(
 def compare(
     learner: Learner, policy: PolicyState, units: Units, lessons: Lesson
 ) -> tuple[float, float]:
-    """How far the policy's servo targets are from the old ones (degrees, rms), and |dq|_1 (rad)."""
+    """How far the policy's servo targets are from the lessons' (degrees, rms), and |dq|_1 (rad)."""
     action = jax.jit(learner.act)(policy, lessons.observation)
     miss = jnp.mean(jnp.square(units.target(action, lessons.condition) - lessons.target))
     offset = units.offset_scale * action[:, units.latent_size :]

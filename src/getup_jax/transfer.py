@@ -84,17 +84,17 @@ def _lessons(
     key: jax.Array,
 ) -> Lesson:
     """What the old policy does on the new task."""
-    (old, new), slices = units, env.observer.slices()
+    (old, new), block = units, env.observer.slices()["action"]
     config = dataclasses.replace(env.config, offset_scale=old.offset_scale, paths=None)
     env = dataclasses.replace(env, config=config)
     world = world.replace(prior=old.prior, pool=world.pool.replace(action=None))
 
     def lesson(observation: jax.Array) -> Lesson:
-        condition = observation[..., slices["targets"]][..., :3]
+        condition = env.observer.condition(observation)
         mean = learner.act(policy, observation)
-        seen = old.translate(observation[..., slices["action"]], condition, new)
+        seen = old.translate(observation[..., block], condition, new)
         return Lesson(
-            observation=observation.at[..., slices["action"]].set(seen),
+            observation=observation.at[..., block].set(seen),
             action=old.translate(mean, condition, new),
             target=old.target(mean, condition),
             condition=condition,

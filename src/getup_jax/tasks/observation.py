@@ -74,6 +74,10 @@ class Observer:
         ends = np.cumsum([size for _, size in self.table])
         return {name: slice(end - size, end) for (name, size), end in zip(self.table, ends)}  # noqa: B905
 
+    def condition(self, observation: jax.Array) -> jax.Array:
+        """The curve values now [..., 3] in raw observations [..., O]: the first of the targets."""
+        return observation[..., self.slices()["targets"]][..., :3]
+
     def posture(self, kinematics: Kinematics, terrain: Ground) -> Posture:
         """Everything that the observation and the rewards take from a physics state."""
         root_position = kinematics.link_position[:, :1]
