@@ -51,6 +51,7 @@ def test_the_actor_learns_the_held_poses_and_keeps_the_rest(built, monkeypatch):
     policy = learner.init_learner(KEY).policy
     log: list[str] = []
     footing.teach_footing(learner, task.world, policy, KEY, log.append)
-    after, before, flat = (float(word) for word in log[-1].split() if word[0].isdigit())
+    after, before, flat, slope = (float(word) for word in log[-1].split() if word[0].isdigit())
     assert after < 0.6 * before
     assert flat < after
+    assert slope < before

@@ -3,8 +3,8 @@
 On a plane the height map says one number 25 times, and feet are never turned to the ground: PPO has
 to find what the map's differences mean while every standing start falls within a second. Standing
 starts on irregular ground have soles on the slope, and hold that pose for a second under their own
-servos. So the actor is taught, by regression, to name that pose there, and what it did before on
-the flat.
+servos. So the actor is taught, by regression, to name that pose there, what it did before on the
+flat, and, while it rises from slopes, what it would do if the map were even.
 """
 
 from __future__ import annotations
@@ -23,10 +23,13 @@ from getup_jax.lessons import Lesson, Log
 from getup_jax.tasks.episode import STANDING, EpisodeState
 from getup_jax.tasks.getup import GetUpTask, World
 
-_OWN, _HELD = 6, 8  # rollouts of the policy on the flat, and batches of poses that are held
+# rollouts of the policy on the flat and on slopes, and batches of poses that are held
+_OWN, _RISING, _HELD = 6, 4, 8
 _HOLD_STEPS, _LOOK_STEPS = 60, 3  # how long they are, and how often a lesson is taken from it
 _PUSH, _PUSH_STEPS = 0.3, 20  # standard deviation of all actions, kept for so many steps
 _FLAT_ONLY = {"curriculum": "success", "unlock_successes": 10**9}  # nothing else opens
+_ALL_OPEN = {"curriculum": "none"}
+_RISES = 0.6  # share of a standing curve's height up to which it rises, and what it did is kept
 _SUNK_M = 0.1  # of the neck: from there on it falls
 
 
@@ -39,24 +42,29 @@ def teach_footing(
     assert env.terrain is not None
     units = env.units(world)
     log("it has trained on a plane: teaching it to stand on slopes ...")
-    keys = jax.random.split(key, _HELD + 2)
+    keys = jax.random.split(key, _HELD + 3)
 
     def as_it_is(observation: jax.Array) -> Lesson:
         condition = env.observer.condition(observation)
-        action = learner.act(policy, observation)
+        action = learner.act(policy, env.observer.evened(observation))
         return Lesson(observation, action, units.target(action, condition), condition)
 
     plane = dataclasses.replace(env, terrain=dataclasses.replace(env.terrain, **_FLAT_ONLY))
     own = lessons.watched(learner, plane, world, policy, as_it_is, _OWN, keys[0])
-    held = [_held(learner, env, world, k) for k in keys[2:]]
-    training = lessons.join([own, *held[:-1]])
+    anywhere = dataclasses.replace(env, terrain=dataclasses.replace(env.terrain, **_ALL_OPEN))
+    rising = lessons.watched(learner, anywhere, world, policy, as_it_is, _RISING, keys[2])
+    low = np.asarray(rising.condition[:, 0]) < _RISES * float(np.max(world.points[:, -1, 0]))
+    rising = jax.tree.map(lambda x: x[low], rising)
+    held = [_held(learner, env, world, k) for k in keys[3:]]
+    training = lessons.join([own, rising, *held[:-1]])
     before, _ = lessons.compare(learner, policy, units, held[-1])
     policy = lessons.taught(learner, policy, units, training, keys[1])
     after, _ = lessons.compare(learner, policy, units, held[-1])
-    flat, _ = lessons.compare(learner, policy, units, own)
+    flat, slope = (lessons.compare(learner, policy, units, x)[0] for x in (own, rising))
     log(
         f"its servo targets on slopes miss the held pose by {after:.2f} degrees (rms), "
-        f"{before:.1f} before; on the flat they moved by {flat:.2f}"
+        f"{before:.1f} before; they moved by {flat:.2f} on the flat, by {slope:.2f} rising from "
+        "slopes"
     )
     return policy
 

@@ -15,7 +15,8 @@ def run(state: Curriculum, config: TerrainConfig, events: list[tuple[int, int]])
     """One step for each (successes, region), in a batch of four."""
     for count, region in events:
         success = jnp.arange(4) < count
-        state = advance(state, config, success, jnp.full(4, region, jnp.int32))
+        ended, where = jnp.ones(4, bool), jnp.full(4, region, jnp.int32)
+        state = advance(state, config, ended, success, where)
     return state
 
 
@@ -62,10 +63,32 @@ def test_without_a_curriculum_all_regions_are_open():
 @pytest.mark.parametrize("opened", [1, 3, 4])
 def test_open_regions_are_visited_evenly(opened):
     state = first(CONFIG).replace(opened=jnp.asarray(opened, jnp.int32))
-    region = jax.jit(draw_region, static_argnums=2)(state, jax.random.PRNGKey(0), 4000)
-    share = np.bincount(region, minlength=4) / 4000
+    share = shares(state, 0.0)
     np.testing.assert_allclose(share[:opened], 1 / opened, atol=0.03)
     np.testing.assert_array_equal(share[opened:], 0.0)
+
+
+def shares(state: Curriculum, focus: float) -> np.ndarray:
+    draw = jax.jit(draw_region, static_argnums=(2, 3))
+    region = draw(state, jax.random.PRNGKey(0), 4000, focus)
+    return np.bincount(region, minlength=4) / 4000
+
+
+def test_regions_that_fail_are_visited_more_often_with_focus():
+    rate = jnp.array([1.0, 0.5, 0.0, 0.0])
+    state = first(CONFIG).replace(opened=jnp.asarray(3, jnp.int32), rate=rate)
+    share = shares(state, 0.9)  # 0.1, 0.55 and 1, and the fourth is closed
+    np.testing.assert_allclose(share, np.array([0.1, 0.55, 1.0, 0.0]) / 1.65, atol=0.03)
+
+
+def test_the_running_success_of_a_region_follows_its_episodes():
+    state = first(CONFIG)
+    ended = jnp.array([True, True, False, True])
+    success = jnp.array([True, False, False, True])
+    region = jnp.array([0, 0, 1, 2], jnp.int32)
+    for _ in range(300):
+        state = advance(state, CONFIG, ended, success, region)
+    np.testing.assert_allclose(state.rate, [0.5, 0.0, 1 - 0.99**300, 0.0], atol=0.01)
 
 
 def test_metrics_of_a_region_are_nan_elsewhere():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tiny_task import CONFIG, tiny_task
 
-from getup_jax.tasks import focus
+from getup_jax.tasks import focus, running
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 from getup_jax.tasks.reset_pool import Startable
 
@@ -88,7 +88,7 @@ def test_a_cell_moves_to_its_episodes_results_and_the_others_stay():
     cell = (jnp.asarray([0, 0, 1, 2]), jnp.asarray([0, 0, 1, 1]), jnp.asarray([3, 3, 0, 7]))
     ended = jnp.asarray([True, True, True, False])
     success = jnp.asarray([True, False, True, True])
-    after = np.asarray(focus.update(learned, cell, ended, success))
+    after = np.asarray(running.update(learned, cell, ended, success, focus.RATE))
     # one episode after the other, the good one and the bad one in either order, moves as far
     assert after[0, 0, 3] == pytest.approx(0.5)
     assert after[1, 1, 0] == pytest.approx(0.5 + focus.RATE * 0.5)

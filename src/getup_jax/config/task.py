@@ -34,7 +34,9 @@ class TaskConfig:
     )
     assist_share: float = 0.5  # share of the lying and clip starts with the hand; needs focus
     curve_match_rad: float = 0.52  # largest gap between a curve's and a pose's torso angles
-    focus: float = 0.0  # 0: starts are drawn evenly; towards 1: at the frontier of what is learned
+    # 0: starts are drawn evenly; towards 1: at the frontier of what is learned, and on irregular
+    # ground in regions where more fails
+    focus: float = 0.0
     focus_even: bool = False  # as often for a style with one part at the frontier as with ten
     start_noise_rad: float = 0.0  # joint noise of the start poses
     pool_size: int = 2048  # start states made once

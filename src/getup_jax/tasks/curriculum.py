@@ -12,6 +12,9 @@ from flax import struct
 
 from getup_jax.config import TerrainConfig
 from getup_jax.physics.terrain_map import REGIONS
+from getup_jax.tasks import running
+
+_RATE = 0.01  # share of an episode's result in its region's running success
 
 
 @struct.dataclass
@@ -21,21 +24,28 @@ class Curriculum:
     opened: jax.Array  # [] int32 regions that are open, the first ones of REGIONS
     successes: jax.Array  # [] int32 in the newest of them, since it opened
     steps: jax.Array  # [] int32 steps of the whole batch
+    rate: jax.Array  # [R] running success of the episodes that began lying in each region
 
 
 def first(config: TerrainConfig) -> Curriculum:
     """Before training: the flat region is open, or all where there is no curriculum."""
     opened = len(REGIONS) if config.curriculum == "none" else 1
     zero = jnp.zeros((), jnp.int32)
-    return Curriculum(opened=jnp.asarray(opened, jnp.int32), successes=zero, steps=zero)
+    rate = jnp.zeros(len(REGIONS), jnp.float32)
+    return Curriculum(jnp.asarray(opened, jnp.int32), successes=zero, steps=zero, rate=rate)
 
 
 def advance(
-    state: Curriculum, config: TerrainConfig, success: jax.Array, region: jax.Array
+    state: Curriculum,
+    config: TerrainConfig,
+    ended: jax.Array,
+    success: jax.Array,
+    region: jax.Array,
 ) -> Curriculum:
     """After one step of B simulations.
 
-    success [B]: an episode that began lying in region [B] (int32) ended standing in this step.
+    ended [B]: an episode that began lying in region [B] (int32) ended in this step; success [B]:
+    and it ended standing.
     `success`: the next region opens after so many of them in the newest one; then they are counted
     anew [T 2.8]. `schedule`: it opens after a number of control steps.
     """
@@ -51,12 +61,19 @@ def advance(
     else:
         opened = state.opened
     successes = jnp.where(opened > state.opened, 0, successes)
-    return Curriculum(opened=opened, successes=successes, steps=steps)
+    rate = running.update(state.rate, (region,), ended, success, _RATE)
+    return Curriculum(opened=opened, successes=successes, steps=steps, rate=rate)
 
 
-def draw_region(state: Curriculum, key: jax.Array, count: int) -> jax.Array:
-    """Regions [count] int32 of new episodes: the open ones, all as often."""
-    return jax.random.randint(key, (count,), 0, state.opened)
+def draw_region(state: Curriculum, key: jax.Array, count: int, share: float) -> jax.Array:
+    """Regions [count] int32 of new episodes: the open ones, in proportion to 1 - share * success.
+
+    With a share of 0 all as often. A solved episode is several times as long as one that fails, so
+    that most samples then come from where least is to learn.
+    """
+    weight = 1.0 - share * state.rate
+    weight = jnp.where(jnp.arange(len(REGIONS)) < state.opened, weight, 0.0)
+    return jax.random.categorical(key, jnp.log(weight), shape=(count,)).astype(jnp.int32)
 
 
 def by_region(episode: dict[str, jax.Array], region: jax.Array) -> dict[str, jax.Array]:

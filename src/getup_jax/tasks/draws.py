@@ -115,7 +115,7 @@ def _places(
     kind = kind.astype(jnp.int32)
     if progress is None:
         return kind, None
-    region = curriculum.draw_region(progress, key_region, num_envs)
+    region = curriculum.draw_region(progress, key_region, num_envs, config.focus)
     if not config.clip_everywhere:
         kind = jnp.where((region > 0) & (kind == CLIP), LYING, kind)
     return kind, region

@@ -100,13 +100,3 @@ def draw(weight: jax.Array, place: jax.Array, key: jax.Array) -> tuple[jax.Array
     entry = jnp.stack([jnp.searchsorted(t, share * t[-1], side="right") for t in total])
     chosen = jnp.minimum(entry[place, jnp.arange(len(place))], total.shape[-1] - 1)
     return (chosen // rows).astype(jnp.int32), (chosen % rows).astype(jnp.int32)
-
-
-def update(
-    learned: jax.Array, cell: tuple[jax.Array, ...], ended: jax.Array, success: jax.Array
-) -> jax.Array:
-    """The running success with the episodes [B] that ended; cell holds their indices [B]."""
-    number = jnp.zeros_like(learned).at[cell].add(ended.astype(jnp.float32))
-    good = jnp.zeros_like(learned).at[cell].add((ended & success).astype(jnp.float32))
-    share = 1.0 - (1.0 - RATE) ** number
-    return learned + share * (good / jnp.maximum(number, 1.0) - learned)

@@ -78,6 +78,12 @@ class Observer:
         """The curve values now [..., 3] in raw observations [..., O]: the first of the targets."""
         return observation[..., self.slices()["targets"]][..., :3]
 
+    def evened(self, observation: jax.Array) -> jax.Array:
+        """Raw observations [..., O] as if the ground below them were even, at its mean height."""
+        block = self.slices()["height_map"]
+        mean = jnp.mean(observation[..., block], axis=-1, keepdims=True)
+        return observation.at[..., block].set(mean)
+
     def posture(self, kinematics: Kinematics, terrain: Ground) -> Posture:
         """Everything that the observation and the rewards take from a physics state."""
         root_position = kinematics.link_position[:, :1]

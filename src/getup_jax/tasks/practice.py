@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from getup_jax.config import TerrainConfig
-from getup_jax.tasks import assist, curriculum, focus
+from getup_jax.tasks import assist, curriculum, focus, running
 from getup_jax.tasks.episode import EpisodeState, stands
 from getup_jax.tasks.reset_pool import Pool
 from getup_jax.types import StepOutput
@@ -45,7 +45,7 @@ def learned(
     success = output.truncated & stands(state.record)
     ended = (output.terminated | output.truncated) & runs_to_the_end(state)
     alone = is_alone(state)
-    after = focus.update(state.focus, cell, ended & alone, success)
+    after = running.update(state.focus, cell, ended & alone, success, focus.RATE)
     if state.assist is None:
         return after, None
     return after, assist.update(state.assist, cell, ended & ~alone, success)
@@ -57,7 +57,8 @@ def progress(
     """The curriculum after a step, None on a flat plane, and the output with its metrics."""
     if terrain is None or state.curriculum is None or state.region is None:
         return None, output
-    success = output.episode["success"] == 1.0
-    after = curriculum.advance(state.curriculum, terrain, success, state.region)
-    opened = jnp.full(len(success), after.opened, jnp.float32)
+    verdict = output.episode["success"]
+    ended = (output.terminated | output.truncated) & ~jnp.isnan(verdict)
+    after = curriculum.advance(state.curriculum, terrain, ended, verdict == 1.0, state.region)
+    opened = jnp.full(len(ended), after.opened, jnp.float32)
     return after, output.replace(metrics=output.metrics | {"regions_open": opened})
