@@ -21,7 +21,7 @@ LAYERS = [
     ["tasks"],
     ["algo"],
     ["lessons"],
-    ["footing", "transfer"],
+    ["footing", "transfer", "rehearsal"],
     ["loop", "train"],
     ["conditions", "naturalness", "episodes", "scores", "score_table", "video", "eval_plot"],
     ["composite"],

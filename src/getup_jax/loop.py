@@ -20,7 +20,8 @@ from getup_jax.progress import Display, count, duration
 from getup_jax.stop import StopRequest
 from getup_jax.storage import CheckpointError, from_nested, is_finite, to_nested
 
-CarryOver = Callable[[Any, checkpoint.LoadedPolicy, Callable[[str], None]], Any]
+Log = Callable[[str], None]
+CarryOver = Callable[[Any, checkpoint.LoadedPolicy, Log], Any]
 Step = Callable[[Any, Any], tuple[Any, dict[str, jax.Array]]]
 
 
@@ -37,6 +38,8 @@ class Job:
     prior: Any  # pytree saved beside the policy, or None
     # (policy, its checkpoint, log) -> the policy as this job means it; None: as it is
     carry_over: CarryOver | None = None
+    # (a fresh policy, log) -> what training begins with; None: the fresh one
+    prepare: Callable[[Any, Log], Any] | None = None
 
 
 def steps_per_iteration(config: Config) -> int:
@@ -63,6 +66,8 @@ class Loop:
             self._restore()
         elif config.train.init_from is not None:
             self._load_policy(config.train.init_from)
+        elif job.prepare is not None:
+            self._begin_with(job.prepare(self._state.learner.policy, display.log))
         self._step = self._compile()
 
     @property
@@ -99,8 +104,11 @@ class Loop:
         self._display.log(f"starting with the policy of {loaded.path}")
         if self._job.carry_over is not None:
             policy = self._job.carry_over(policy, loaded, self._display.log)
+        self._begin_with(policy)
+
+    def _begin_with(self, policy: Any) -> None:
         # a copy: what the first iteration donates must be nobody else's
-        learner = dataclasses.replace(learner, policy=owned(policy))
+        learner = dataclasses.replace(self._state.learner, policy=owned(policy))
         self._state = dataclasses.replace(self._state, learner=learner)
 
     def _compile(self) -> Step:

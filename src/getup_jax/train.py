@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +21,7 @@ from getup_jax.loop import CarryOver, Job, Loop, TrainingError, num_iterations, 
 from getup_jax.metrics import MetricsWriter, tensorboard_module
 from getup_jax.nets import prior as pose_prior
 from getup_jax.progress import Display, count, duration
+from getup_jax.rehearsal import rehearse
 from getup_jax.runfolder import prepare, resume_command
 from getup_jax.stop import StopRequest
 from getup_jax.storage import CheckpointError
@@ -82,7 +84,16 @@ def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Job]:
         total_steps=config.train.total_steps,
         objectives=make_objectives(built.environment, built.environment.config),
     )
-    return built, Job(learner=learner, world=world, prior=None)
+    prepare = None
+    if env.config.rehearse:
+        prepare = functools.partial(_rehearse, learner, built, config.seed)
+    return built, Job(learner=learner, world=world, prior=None, prepare=prepare)
+
+
+def _rehearse(
+    learner: Learner, built: BuiltComposite, seed: int, policy: PolicyState, log: Log
+) -> PolicyState:
+    return rehearse(learner, built, policy, jax.random.PRNGKey(seed), log)
 
 
 def run(

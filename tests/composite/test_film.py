@@ -34,7 +34,7 @@ def built() -> BuiltComposite:
     character = load_character(PhysicsConfig(character="humanoid28"))
     goals = make_goals({"target_location": {}}, character, FakeEngine.control_dt)
     task = CompositeTask(FakeEngine(), character, COMPOSITE, (), goals)
-    return BuiltComposite(task, None, clips(character))
+    return BuiltComposite(task, None, clips(character), None)
 
 
 def episodes(built: BuiltComposite, place: tuple[float, float]) -> CompositeEpisodes:

@@ -21,6 +21,7 @@ from getup_jax.tasks.reference_windows import make_references, unrolled
 from getup_jax.tasks.references import velocities
 from getup_jax.types import Engine, take
 
+FOLLOWING = 32  # frames after a start that are kept
 _STILL_RAD = 0.6  # scale of a hinge that the clips do not move
 _MIXES = 8  # starts of every frame of the start group's clips
 _SPREADS = 4.0  # added to it: times the standard deviation of the clips' angles
@@ -33,6 +34,8 @@ class BuiltComposite:
     environment: CompositeTask
     world: CompositeWorld
     clips: dict[str, list[Clip]]  # by group
+    # [P, FOLLOWING, J] hinge angles (rad) of the frames after each start; NaN: past the clip's end
+    following: np.ndarray
 
 
 def build_composite(config: Config, log: Callable[[str], None]) -> BuiltComposite:
@@ -70,13 +73,13 @@ def assemble_composite(
     moving = [resampled(unrolled(clip), 1.0 / engine.control_dt) for clip in clips[start]]
     if composite.start_mixed:
         moving = mixed(moving, start, composite, character, clips)
-    starts = _starts(moving, character, engine, config.task.pool_size)
+    starts, following = _starts(moving, character, engine, config.task.pool_size)
     _check_starts(task, starts, f"composite.groups.{start}.clips")
     log(f"engine: {engine.name}; {len(starts.history)} start states along {start}'s clips")
     world = CompositeWorld(
         starts=starts, references=references, **_targets(task, clips, config.task)
     )
-    return BuiltComposite(task, world, clips)
+    return BuiltComposite(task, world, clips, following)
 
 
 def _targets(task: CompositeTask, clips: dict[str, list[Clip]], config: TaskConfig) -> dict:
@@ -177,20 +180,31 @@ def mixed(
     return found
 
 
-def _starts(clips: Sequence[Clip], character: CharacterSpec, engine: Engine, most: int) -> Starts:
-    """Every frame of clips at the control rate that has enough before it; at most `most`."""
-    qpos, qvel, rows, count = [], [], [], 0
+def _starts(
+    clips: Sequence[Clip], character: CharacterSpec, engine: Engine, most: int
+) -> tuple[Starts, np.ndarray]:
+    """Every frame of clips at the control rate that has enough before it; at most `most`.
+
+    Also what follows each of them, see `BuiltComposite`.
+    """
+    qpos, qvel, rows, ends, count = [], [], [], [], 0
     for moving in clips:
         qvel.append(velocities(moving, character))
         qpos.append(moving.qpos[:-1])
         rows.append(count + np.arange(FRAMES, len(qpos[-1])))
         count += len(qpos[-1])
-    chosen = np.concatenate(rows)
-    chosen = chosen[np.linspace(0, len(chosen) - 1, min(most, len(chosen))).astype(int)]
-    physics = engine.place(np.concatenate(qpos), np.concatenate(qvel))
+        ends.append(np.full(len(rows[-1]), count))
+    chosen, end = np.concatenate(rows), np.concatenate(ends)
+    kept = np.linspace(0, len(chosen) - 1, min(most, len(chosen))).astype(int)
+    chosen, end = chosen[kept], end[kept]
+    places = np.concatenate(qpos)
+    physics = engine.place(places, np.concatenate(qvel))
     frames = link_state(physics.kinematics)
     before = chosen[:, None] + np.arange(-FRAMES, 1)
-    return Starts(physics=take(physics, jnp.asarray(chosen)), history=frames[before])
+    after = chosen[:, None] + np.arange(1, FOLLOWING + 1)
+    following = places[np.minimum(after, len(places) - 1), 7:]
+    following[after >= end[:, None]] = np.nan
+    return Starts(physics=take(physics, jnp.asarray(chosen)), history=frames[before]), following
 
 
 def resampled(clip: Clip, fps: float) -> Clip:

@@ -1,0 +1,162 @@
+"""Rehearsal of composite motion: the actor learns what comes next in the clips, before training.
+
+A fresh actor holds the clips' mean pose. Each step of learning from there first ends fewer falls,
+and a character that stands still falls least: it comes to rest in some pose of the clips, where the
+discriminators have little to say against it, or it falls so soon that they are sure of everything.
+So the actor is first taught, by regression, to name servo targets that lead to the clips' next
+pose: in the states that it gets to itself when it starts on the clips (Ross et al. 2011, A
+reduction of imitation learning ... to no-regret online learning). Balance is left to training.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+
+from getup_jax.algo.actor_critic import normalized, observe
+from getup_jax.algo.learner import Learner
+from getup_jax.algo.state import PolicyState
+from getup_jax.algo.update import run_minibatches, shuffled_minibatches
+from getup_jax.nets import gaussian
+from getup_jax.tasks.build_composite import BuiltComposite
+from getup_jax.tasks.composite import CompositeState, CompositeTask, CompositeWorld
+
+Log = Callable[[str], None]
+
+_ROUNDS = 4  # of playing and learning; in the first one the clips' own targets are played
+_LOOK_STEPS = 2  # a state is kept every so many steps
+_EPOCHS, _MINIBATCH = 20, 256
+_LEARNING_RATES = 1e-3, 1e-5
+_STD = 0.01  # weight of (log std - the first one)^2 beside the squared error (rad^2)
+
+
+class Rehearsed(NamedTuple):
+    """N states and what to do there."""
+
+    observation: Any  # [N, O] raw
+    action: Any  # [N, A]
+
+
+def rehearse(
+    learner: Learner, built: BuiltComposite, policy: PolicyState, key: jax.Array, log: Log
+) -> PolicyState:
+    """The policy with an actor that goes on with the clips, and statistics of what it saw."""
+    log("rehearsing: teaching the actor what comes next in the clips ...")
+    targets = clip_targets(built)
+    parts: list[Rehearsed] = []
+    for number, key_round in enumerate(jax.random.split(key, _ROUNDS)):
+        key_play, key_order = jax.random.split(key_round)
+        part = _play(learner, built, policy, targets, key_play, own=number > 0)
+        parts.append(part)
+        if number == 0:
+            policy = observe(policy, jnp.asarray(part.observation))
+        before = _miss(learner, built.world, policy, part)
+        everything = Rehearsed(*(np.concatenate(x) for x in zip(*parts, strict=True)))
+        policy = _taught(learner, built.world, policy, everything, key_order)
+    after = _miss(learner, built.world, policy, parts[-1])
+    log(
+        f"its servo targets miss those of the clips by {after:.1f} degrees (rms), {before:.1f} in "
+        "the last states before it had learned from them"
+    )
+    return policy
+
+
+def clip_targets(built: BuiltComposite) -> np.ndarray:
+    """Servo targets [P, K - 1, J] (rad) that lead along the clips from every start; NaN: past one.
+
+    q(t + dt) + kd / kp dq/dt, since a PD servo with damping lags behind by kd / kp.
+    """
+    following, task = built.following, built.environment
+    model = task.character.model
+    lag = -model.actuator_biasprm[:, 2] / model.actuator_gainprm[:, 0]
+    rate = np.diff(following, axis=1) / task.engine.control_dt
+    return following[:, :-1] + lag * rate
+
+
+def _play(
+    learner: Learner,
+    built: BuiltComposite,
+    policy: PolicyState,
+    targets: np.ndarray,
+    key: jax.Array,
+    own: bool,
+) -> Rehearsed:
+    """States on the way from starts on the clips, by the actor's own actions or the clips'."""
+    env, world = built.environment, built.world
+    std = learner.model.initial_std or learner.config.action_std[-1]
+    key_row, key_start, key_noise = jax.random.split(key, 3)
+    row = jax.random.randint(key_row, (learner.config.num_envs,), 0, len(targets))
+    state = env.start(world, row, key_start).replace(key=key_start)
+    way = (targets[row] - np.asarray(world.target_centre)) / np.asarray(world.target_scale)
+    goes_on = np.ones(len(row), bool)
+    kept: list[Rehearsed] = []
+    for step, key_step in enumerate(jax.random.split(key_noise, way.shape[1])):
+        goes_on &= np.isfinite(way[:, step]).all(axis=-1)
+        action = jnp.asarray(np.nan_to_num(way[:, step]), jnp.float32)
+        if step % _LOOK_STEPS == 0:
+            seen = np.asarray(state.observation)[goes_on]
+            kept.append(Rehearsed(seen, np.asarray(action)[goes_on]))
+        if own:
+            action = learner.act(policy, state.observation)
+        action = gaussian.sample(key_step, action, jnp.full_like(action, std))
+        state, fell = _STEP(env, world, state, action)
+        goes_on &= ~np.asarray(fell)
+    return Rehearsed(*(np.concatenate(x) for x in zip(*kept, strict=True)))
+
+
+def _step(
+    env: CompositeTask, world: CompositeWorld, state: CompositeState, action: jax.Array
+) -> tuple[CompositeState, jax.Array]:
+    state, output = env.advance(world, state, action)
+    return state, output.terminated
+
+
+_STEP = jax.jit(_step, static_argnums=0)
+
+
+def _taught(
+    learner: Learner,
+    world: CompositeWorld,
+    policy: PolicyState,
+    seen: Rehearsed,
+    key: jax.Array,
+) -> PolicyState:
+    """The policy after regression of its mean actions; its std stays near the first one."""
+    size = min(_MINIBATCH, len(seen.action))
+    updates = len(seen.action) // size
+    rate = optax.cosine_decay_schedule(
+        _LEARNING_RATES[0], _EPOCHS * updates, _LEARNING_RATES[1] / _LEARNING_RATES[0]
+    )
+    optimiser = optax.adam(rate)
+    first = math.log(learner.model.initial_std or 1.0)
+
+    def loss(actor: Any, part: Rehearsed) -> tuple[jax.Array, dict[str, jax.Array]]:
+        observation = normalized(policy, part.observation)
+        mean, std = learner.model.distribution(actor, observation, jnp.ones(()))
+        miss = jnp.mean(jnp.square(world.target_scale * (mean - part.action)))
+        return miss + _STD * jnp.mean(jnp.square(jnp.log(std) - first)), {"miss": miss}
+
+    @jax.jit
+    def epoch(carry: tuple[Any, Any], seen: Rehearsed, key: jax.Array) -> tuple[Any, Any]:
+        order = shuffled_minibatches(key, 1, updates * size, size)
+        return run_minibatches(loss, optimiser, *carry, seen, order)[:2]
+
+    carry = (policy.actor, optimiser.init(policy.actor))
+    seen = Rehearsed(*(jnp.asarray(x) for x in seen))
+    for key_epoch in jax.random.split(key, _EPOCHS):
+        carry = epoch(carry, seen, key_epoch)
+    return dataclasses.replace(policy, actor=carry[0])
+
+
+def _miss(learner: Learner, world: CompositeWorld, policy: PolicyState, seen: Rehearsed) -> float:
+    """How far its servo targets are from those of the clips (degrees, rms)."""
+    action = jax.jit(learner.act)(policy, jnp.asarray(seen.observation))
+    miss = jnp.mean(jnp.square(world.target_scale * (action - seen.action)))
+    return math.degrees(math.sqrt(miss))
