@@ -1,0 +1,81 @@
+"""The actor of composite motion learns what comes next in the clips."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from tiny_composite import COMPOSITE, CONFIG, clips, tiny_composite
+
+from getup_jax import rehearsal
+from getup_jax.algo.learner import make_learner
+from getup_jax.config import ConfigError
+from getup_jax.physics.character import load_character
+from getup_jax.tasks.build_composite import FOLLOWING
+
+KEY = jax.random.PRNGKey(0)
+
+
+@pytest.fixture(scope="module")
+def built():
+    return tiny_composite(load_character(CONFIG.physics))
+
+
+def test_what_follows_a_start_is_its_clip(built):
+    character = built.environment.character
+    squat = clips(character)["lower"][0]
+    knee = character.joint("shin_l_flex")
+    following = built.following[:, :, knee]
+    starts = np.asarray(built.world.starts.physics.kinematics.qpos)[:, 7 + knee]
+    assert following.shape == (len(starts), FOLLOWING)
+    # the clip is a loop that is played twice: each frame but the last ones has a next one
+    angles = squat.qpos[:, 7 + knee]
+    frame = np.abs(angles[None, :-1] - starts[:, None]).argmin(axis=1)
+    reached = np.isfinite(following[:, 0])
+    up_or_down = np.minimum(
+        np.abs(following[:, 0] - angles[frame + 1]), np.abs(following[:, 0] - angles[frame - 1])
+    )
+    np.testing.assert_allclose(up_or_down[reached], 0.0, atol=1e-3)
+    past = np.isnan(following).sum(axis=1)
+    assert past[0] == 0
+    assert past[-1] == FOLLOWING
+
+
+def test_targets_lead_by_the_lag_of_the_servo(built):
+    model = built.environment.character.model
+    joints = built.following.shape[-1]
+    ramp = np.broadcast_to(np.arange(FOLLOWING, dtype=float)[:, None], (FOLLOWING, joints)) * 0.01
+    made = dataclasses.replace(built, following=ramp[None])
+    lag = -model.actuator_biasprm[:, 2] / model.actuator_gainprm[:, 0]
+    expected = ramp[:-1] + lag * 0.01 * 30.0  # rad + s * rad/s
+    np.testing.assert_allclose(rehearsal.clip_targets(made)[0], expected, atol=1e-9)
+
+
+def test_the_actor_comes_to_name_the_clips_targets(built, monkeypatch):
+    monkeypatch.setattr(rehearsal, "_MINIBATCH", 16)
+    monkeypatch.setattr(rehearsal, "_ROUNDS", 2)
+    learner = make_learner(built.environment, CONFIG.network, CONFIG.ppo, total_steps=1000)
+    policy = learner.init_learner(KEY).policy
+    row = jnp.arange(8)
+    observation = built.environment.start(built.world, row, KEY).observation
+    targets = rehearsal.clip_targets(built)[row, 0]
+
+    def miss(policy) -> float:
+        action = learner.act(policy, observation)
+        target = built.world.target_centre + built.world.target_scale * action
+        return float(np.sqrt(np.mean(np.square(target - targets))))
+
+    log: list[str] = []
+    after = rehearsal.rehearse(learner, built, policy, KEY, log.append)
+    assert miss(after) < 0.5 * miss(policy)
+    std = learner.model.distribution(after.actor, jnp.zeros_like(observation), jnp.ones(()))[1]
+    np.testing.assert_allclose(std, CONFIG.network.initial_std, rtol=0.5)
+    assert "degrees" in log[-1]
+
+
+def test_a_meta_policy_knows_its_motion_already():
+    with pytest.raises(ConfigError, match=r"composite\.rehearse: expected false"):
+        dataclasses.replace(COMPOSITE, rehearse=True, meta="runs/walk")
