@@ -4,13 +4,17 @@ On a plane the height map says one number 25 times, and feet are never turned to
 to find what the map's differences mean while every standing start falls within a second. Standing
 starts on irregular ground have soles on the slope, and hold that pose for a second under their own
 servos. So the actor is taught, by regression, to name that pose there, what it did before on the
-flat, and, while it rises from slopes, what it would do if the map were even.
+flat, and, while it rises from slopes, what it would do if the map were even, but for one thing.
+Motions that start prone have raised the head before it counts as lying on the floor [P 5.3]; limp
+bodies that came to rest face down have not, and a policy that trained on motions moves their arms
+first. So there the neck is stretched while the curve still lies.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -30,6 +34,8 @@ _PUSH, _PUSH_STEPS = 0.3, 20  # standard deviation of all actions, kept for so m
 _FLAT_ONLY = {"curriculum": "success", "unlock_successes": 10**9}  # nothing else opens
 _ALL_OPEN = {"curriculum": "none"}
 _RISES = 0.6  # share of a standing curve's height up to which it rises, and what it did is kept
+_LIES_M, _PRONE_RAD = 0.2, 2.2  # a curve that lies is lower, one that faces down has more
+_STRETCHED = ("neck_flex", "head_flex")  # to their lower limits
 _SUNK_M = 0.1  # of the neck: from there on it falls
 
 
@@ -52,7 +58,13 @@ def teach_footing(
     plane = dataclasses.replace(env, terrain=dataclasses.replace(env.terrain, **_FLAT_ONLY))
     own = lessons.watched(learner, plane, world, policy, as_it_is, _OWN, keys[0])
     anywhere = dataclasses.replace(env, terrain=dataclasses.replace(env.terrain, **_ALL_OPEN))
-    rising = lessons.watched(learner, anywhere, world, policy, as_it_is, _RISING, keys[2])
+    stretched = _stretched(env)
+
+    def head_up(observation: jax.Array) -> Lesson:
+        lesson = as_it_is(observation)
+        return lesson.replace(target=stretched(lesson.target, lesson.condition))
+
+    rising = lessons.watched(learner, anywhere, world, policy, head_up, _RISING, keys[2])
     low = np.asarray(rising.condition[:, 0]) < _RISES * float(np.max(world.points[:, -1, 0]))
     rising = jax.tree.map(lambda x: x[low], rising)
     held = [_held(learner, env, world, k) for k in keys[3:]]
@@ -67,6 +79,18 @@ def teach_footing(
         "slopes"
     )
     return policy
+
+
+def _stretched(env: GetUpTask) -> Callable[[jax.Array, jax.Array], jax.Array]:
+    """Targets [N, J] with the neck stretched where the curve values [N, 3] lie face down."""
+    hinges = jnp.asarray([env.character.joint(name) for name in _STRETCHED])
+    limits = jnp.asarray(env.character.joint_lower, jnp.float32)[hinges]
+
+    def stretched(target: jax.Array, condition: jax.Array) -> jax.Array:
+        lies = (condition[:, 0] < _LIES_M) & (condition[:, 2] > _PRONE_RAD)
+        return target.at[:, hinges].set(jnp.where(lies[:, None], limits, target[:, hinges]))
+
+    return stretched
 
 
 def _held(learner: Learner, env: GetUpTask, world: World, key: jax.Array) -> Lesson:

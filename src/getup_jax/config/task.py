@@ -20,6 +20,9 @@ class TaskConfig:
     terminate_reward: float = 0.1  # early end below this task reward ...
     terminate_after_s: float = 0.3  # ... or with the head on the floor, for this long
     head_clearance_m: float = 0.02  # the head is on the floor below this gap
+    # while training: for this long a head that is on the floor for too long only costs the reward;
+    # limp bodies that came to rest face down must learn to raise it
+    head_grace_s: float = 0.0
     stand_start: float = 0.3  # share of episodes that start standing
     clip_start: float = 0.0  # share that starts along the reference clip, or one that fits
     # on irregular ground too, turned towards its slope and set down on it
@@ -52,6 +55,7 @@ class TaskConfig:
         require(ok, "task.focus", "more than 0 where task.assist is", self.focus)
         ok = 0 <= self.assist_share < 1
         require(ok, "task.assist_share", "at least 0 and less than 1", self.assist_share)
+        require(self.head_grace_s >= 0, "task.head_grace_s", "at least 0", self.head_grace_s)
         require(self.short_s > 0, "task.short_s", "more than 0", self.short_s)
         require(0 <= self.path_share <= 1, "task.path_share", "between 0 and 1", self.path_share)
         require(0 < self.filter <= 1, "task.filter", "more than 0 and at most 1", self.filter)

@@ -26,9 +26,15 @@ class Draw(NamedTuple):
 
 
 def whole_episodes(config: TaskConfig) -> TaskConfig:
-    """The settings without what only helps training: no starts on the way, focus, cuts, hand."""
+    """The settings without what only helps to train: starts on the way, focus, hand and so on."""
     return dataclasses.replace(
-        config, clip_start=0.0, paths=None, focus=0.0, short_share=0.0, assist=0.0
+        config,
+        clip_start=0.0,
+        paths=None,
+        focus=0.0,
+        short_share=0.0,
+        assist=0.0,
+        head_grace_s=0.0,
     )
 
 

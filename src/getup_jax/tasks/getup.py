@@ -174,6 +174,9 @@ class GetUpTask:
         finite = physics.kinematics.finite
         terms = {name: jnp.where(finite, value, 0.0) for name, value in terms.items()}
         state, causes = self._early_ends(world, state, terms["task"], finite)
+        if self.config.head_grace_s > 0:
+            paid = state.head_steps <= self._steps(self.config.terminate_after_s)
+            terms["total"] = jnp.where(paid, terms["total"], 0.0)
         terminated = causes["low_reward"] | causes["head"] | causes["not_finite"]
         half_step = 0.5 * self.engine.control_dt
         end = state.duration + self.config.stand_time_s - half_step
@@ -274,13 +277,17 @@ class GetUpTask:
             low_steps=jnp.where(low, state.low_steps + 1, 0),
             head_steps=jnp.where(head, state.head_steps + 1, 0),
         )
-        most = self.config.terminate_after_s / self.engine.control_dt + 1e-3
+        config = self.config
         causes = {
-            "low_reward": state.low_steps > most,
-            "head": state.head_steps > most,
+            "low_reward": state.low_steps > self._steps(config.terminate_after_s),
+            "head": state.head_steps > self._steps(config.terminate_after_s + config.head_grace_s),
             "not_finite": ~finite,
         }
         return state, causes
+
+    def _steps(self, seconds: float) -> float:
+        """Control steps in that time; as many are not yet more than it."""
+        return seconds / self.engine.control_dt + 1e-3
 
     def _head_gap(self, world: World, state: EpisodeState) -> jax.Array:
         """Distance [B] from the head's lowest point to the ground (m)."""
