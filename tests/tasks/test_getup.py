@@ -174,19 +174,38 @@ def test_one_good_step_starts_the_count_of_low_ones_again(jitted):
     np.testing.assert_array_equal(good.low_steps, 0)
 
 
-def test_the_head_on_the_floor_for_ten_steps_ends_an_episode(jitted, character):
-    neck = character.joint("neck_flex")
+def head_down(jitted, character) -> EpisodeState:
+    """On the back long before the curve's start, so that the reward stays high."""
     state = jitted.start(LYING)
     qpos = np.array(state.physics.kinematics.qpos)
-    qpos[:, 7 + neck] = -0.1  # the back of the head down
+    qpos[:, 7 + character.joint("neck_flex")] = -0.1  # the back of the head down
     physics = jitted.task.engine.place(qpos, np.zeros((B, 55)))
-    # long before the curve's start, so that the reward stays high
-    _, (_, outputs) = jitted.play(jitted.world, at_time(state.replace(physics=physics), -9.0), 12)
+    return at_time(state.replace(physics=physics), -9.0)
+
+
+def test_the_head_on_the_floor_for_ten_steps_ends_an_episode(jitted, character):
+    _, (_, outputs) = jitted.play(jitted.world, head_down(jitted, character), 12)
     head = np.asarray(outputs.metrics["ended_head"])
     np.testing.assert_array_equal(head[:9], 0.0)
     np.testing.assert_array_equal(head[9:], 1.0)
     np.testing.assert_array_equal(outputs.terminated, head.astype(bool))
     assert not np.asarray(outputs.metrics["ended_low_reward"]).any()
+
+
+def test_within_its_grace_a_head_on_the_floor_costs_the_reward_alone(jitted, character):
+    config = dataclasses.replace(jitted.task.config, head_grace_s=0.1)  # three steps
+    lenient = Jitted.__new__(Jitted)
+    lenient.task = dataclasses.replace(jitted.task, config=config)
+    _, (_, outputs) = jax.jit(lenient._play, static_argnums=2)(
+        jitted.world, head_down(jitted, character), 14
+    )
+    reward = np.asarray(outputs.reward)[..., 0]
+    assert (reward[:9] > 0.1).all()
+    np.testing.assert_array_equal(reward[9:], 0.0)
+    assert (np.asarray(outputs.metrics["reward_task"]) > 0.1).all()
+    head = np.asarray(outputs.metrics["ended_head"])
+    np.testing.assert_array_equal(head[:12], 0.0)
+    np.testing.assert_array_equal(head[12:], 1.0)
 
 
 def test_a_raised_head_ends_nothing(jitted, character):
