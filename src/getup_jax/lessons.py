@@ -16,7 +16,7 @@ from getup_jax.algo.actor_critic import normalized
 from getup_jax.algo.learner import Learner
 from getup_jax.algo.rollout import rollout
 from getup_jax.algo.state import PolicyState
-from getup_jax.algo.update import run_minibatches, shuffled_minibatches
+from getup_jax.algo.update import Loss, run_minibatches, shuffled_minibatches
 from getup_jax.nets import gaussian
 from getup_jax.tasks import rewards
 from getup_jax.tasks.actions import Units
@@ -94,13 +94,6 @@ def taught(
     learner: Learner, policy: PolicyState, units: Units, lessons: Lesson, key: jax.Array
 ) -> PolicyState:
     """The policy after regression of its targets, with latents as far as they can say them."""
-    count = len(lessons.observation)
-    size = min(_MINIBATCH, count)
-    updates = count // size
-    rate = optax.cosine_decay_schedule(
-        _LEARNING_RATES[0], _EPOCHS * updates, _LEARNING_RATES[1] / _LEARNING_RATES[0]
-    )
-    optimiser = optax.adam(rate)
     latents, limit = units.latent_size, learner.env.config.offset_limit_rad
 
     def loss(actor: Any, part: Lesson) -> tuple[jax.Array, dict[str, jax.Array]]:
@@ -112,15 +105,33 @@ def taught(
         unnatural = jnp.mean(1.0 - rewards.natural(units.offset_scale * offset, limit))
         return miss + _NEAR * far + _NATURAL * unnatural, {"miss": miss}
 
-    @jax.jit
-    def epoch(carry: tuple[Any, Any], key: jax.Array) -> tuple[Any, Any]:
-        order = shuffled_minibatches(key, 1, updates * size, size)
-        return run_minibatches(loss, optimiser, *carry, lessons, order)[:2]
+    actor = regress(loss, policy.actor, lessons, key, _EPOCHS, _MINIBATCH)
+    return dataclasses.replace(policy, actor=actor)
 
-    carry = (policy.actor, optimiser.init(policy.actor))
-    for key_epoch in jax.random.split(key, _EPOCHS):
-        carry = epoch(carry, key_epoch)
-    return dataclasses.replace(policy, actor=carry[0])
+
+def regress(
+    loss: Loss, parameters: Any, samples: Any, key: jax.Array, epochs: int, minibatch: int
+) -> Any:
+    """The parameters after epochs of Adam, its rate falling along a cosine.
+
+    samples: pytree of [N, ...]; an epoch leaves out what fills no minibatch of them.
+    """
+    count = len(jax.tree.leaves(samples)[0])
+    size = min(minibatch, count)
+    updates = count // size
+    first, last = _LEARNING_RATES
+    optimiser = optax.adam(optax.cosine_decay_schedule(first, epochs * updates, last / first))
+
+    @jax.jit
+    def epoch(carry: tuple[Any, Any], samples: Any, key: jax.Array) -> tuple[Any, Any]:
+        order = shuffled_minibatches(key, 1, updates * size, size)
+        return run_minibatches(loss, optimiser, *carry, samples, order)[:2]
+
+    carry = (parameters, optimiser.init(parameters))
+    samples = jax.tree.map(jnp.asarray, samples)
+    for key_epoch in jax.random.split(key, epochs):
+        carry = epoch(carry, samples, key_epoch)
+    return carry[0]
 
 
 def compare(

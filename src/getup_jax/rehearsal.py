@@ -18,12 +18,11 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optax
 
+from getup_jax import lessons
 from getup_jax.algo.actor_critic import normalized, observe
 from getup_jax.algo.learner import Learner
 from getup_jax.algo.state import PolicyState
-from getup_jax.algo.update import run_minibatches, shuffled_minibatches
 from getup_jax.nets import gaussian
 from getup_jax.tasks.build_composite import BuiltComposite
 from getup_jax.tasks.composite import CompositeState, CompositeTask, CompositeWorld
@@ -33,7 +32,6 @@ Log = Callable[[str], None]
 _ROUNDS = 4  # of playing and learning; in the first one the clips' own targets are played
 _LOOK_STEPS = 2  # a state is kept every so many steps
 _EPOCHS, _MINIBATCH = 20, 256
-_LEARNING_RATES = 1e-3, 1e-5
 _STD = 0.01  # weight of (log std - the first one)^2 beside the squared error (rad^2)
 
 
@@ -129,12 +127,6 @@ def _taught(
     key: jax.Array,
 ) -> PolicyState:
     """The policy after regression of its mean actions; its std stays near the first one."""
-    size = min(_MINIBATCH, len(seen.action))
-    updates = len(seen.action) // size
-    rate = optax.cosine_decay_schedule(
-        _LEARNING_RATES[0], _EPOCHS * updates, _LEARNING_RATES[1] / _LEARNING_RATES[0]
-    )
-    optimiser = optax.adam(rate)
     first = math.log(learner.model.initial_std or 1.0)
 
     def loss(actor: Any, part: Rehearsed) -> tuple[jax.Array, dict[str, jax.Array]]:
@@ -143,16 +135,8 @@ def _taught(
         miss = jnp.mean(jnp.square(world.target_scale * (mean - part.action)))
         return miss + _STD * jnp.mean(jnp.square(jnp.log(std) - first)), {"miss": miss}
 
-    @jax.jit
-    def epoch(carry: tuple[Any, Any], seen: Rehearsed, key: jax.Array) -> tuple[Any, Any]:
-        order = shuffled_minibatches(key, 1, updates * size, size)
-        return run_minibatches(loss, optimiser, *carry, seen, order)[:2]
-
-    carry = (policy.actor, optimiser.init(policy.actor))
-    seen = Rehearsed(*(jnp.asarray(x) for x in seen))
-    for key_epoch in jax.random.split(key, _EPOCHS):
-        carry = epoch(carry, seen, key_epoch)
-    return dataclasses.replace(policy, actor=carry[0])
+    actor = lessons.regress(loss, policy.actor, seen, key, _EPOCHS, _MINIBATCH)
+    return dataclasses.replace(policy, actor=actor)
 
 
 def _miss(learner: Learner, world: CompositeWorld, policy: PolicyState, seen: Rehearsed) -> float:
