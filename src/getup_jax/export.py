@@ -63,6 +63,11 @@ def export(
 
 def _evaluation(file: Path, loaded: LoadedPolicy) -> Mapping[str, Any]:
     """What `getup-eval --json` wrote, of the same policy."""
+    if loaded.config.composite_motion:
+        raise ConfigError(
+            f"--eval: {file}: a card has no tables of composite motion; export without, and write "
+            "the numbers into it"
+        )
     try:
         result = json.loads(file.read_text(encoding="utf-8"))
         found = [result["policy"].get(key) for key in ("iteration", "steps", "seed")]
