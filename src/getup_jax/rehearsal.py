@@ -49,6 +49,7 @@ def rehearse(
     log("rehearsing: teaching the actor what comes next in the clips ...")
     targets = clip_targets(built)
     parts: list[Rehearsed] = []
+    before = math.nan
     for number, key_round in enumerate(jax.random.split(key, _ROUNDS)):
         key_play, key_order = jax.random.split(key_round)
         part = _play(learner, built, policy, targets, key_play, own=number > 0)
