@@ -103,7 +103,7 @@ def _play(
             seen = np.asarray(state.observation)[goes_on]
             kept.append(Rehearsed(seen, np.asarray(action)[goes_on]))
         if own:
-            action = learner.act(policy, state.observation)
+            action = jax.jit(learner.act)(policy, state.observation)
         action = gaussian.sample(key_step, action, jnp.full_like(action, std))
         state, fell = _STEP(env, world, state, action)
         goes_on &= ~np.asarray(fell)
