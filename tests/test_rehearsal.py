@@ -13,8 +13,9 @@ from tiny_composite import COMPOSITE, CONFIG, clips, tiny_composite
 from getup_jax import rehearsal
 from getup_jax.algo.learner import make_learner
 from getup_jax.config import ConfigError
+from getup_jax.motion.loops import repeated
 from getup_jax.physics.character import load_character
-from getup_jax.tasks.build_composite import FOLLOWING
+from getup_jax.tasks.clip_starts import FOLLOWING, Following, clip_starts
 
 KEY = jax.random.PRNGKey(0)
 
@@ -28,7 +29,7 @@ def test_what_follows_a_start_is_its_clip(built):
     character = built.environment.character
     squat = clips(character)["lower"][0]
     knee = character.joint("shin_l_flex")
-    following = built.following[:, :, knee]
+    following = built.following.angles[:, 0, :, knee]
     starts = np.asarray(built.world.starts.physics.kinematics.qpos)[:, 7 + knee]
     assert following.shape == (len(starts), FOLLOWING)
     # the clip is a loop that is played twice: each frame but the last ones has a next one
@@ -46,12 +47,12 @@ def test_what_follows_a_start_is_its_clip(built):
 
 def test_targets_lead_by_the_lag_of_the_servo(built):
     model = built.environment.character.model
-    joints = built.following.shape[-1]
+    joints = built.following.angles.shape[-1]
     ramp = np.broadcast_to(np.arange(FOLLOWING, dtype=float)[:, None], (FOLLOWING, joints)) * 0.01
-    made = dataclasses.replace(built, following=ramp[None])
+    made = dataclasses.replace(built, following=Following(ramp[None, None], np.zeros(1)))
     lag = -model.actuator_biasprm[:, 2] / model.actuator_gainprm[:, 0]
     expected = ramp[:-1] + lag * 0.01 * 30.0  # rad + s * rad/s
-    np.testing.assert_allclose(rehearsal.clip_targets(made)[0], expected, atol=1e-9)
+    np.testing.assert_allclose(rehearsal.clip_targets(made)[0, 0], expected, atol=1e-9)
 
 
 def test_the_actor_comes_to_name_the_clips_targets(built, monkeypatch):
@@ -61,7 +62,7 @@ def test_the_actor_comes_to_name_the_clips_targets(built, monkeypatch):
     policy = learner.init_learner(KEY).policy
     row = jnp.arange(8)
     observation = built.environment.start(built.world, row, KEY).observation
-    targets = rehearsal.clip_targets(built)[row, 0]
+    targets = rehearsal.clip_targets(built)[row, 0, 0]
 
     def miss(policy) -> float:
         action = learner.act(policy, observation)
@@ -74,6 +75,37 @@ def test_the_actor_comes_to_name_the_clips_targets(built, monkeypatch):
     std = learner.model.distribution(after.actor, jnp.zeros_like(observation), jnp.ones(()))[1]
     np.testing.assert_allclose(std, CONFIG.network.initial_std, rtol=0.5)
     assert "degrees" in log[-1]
+
+
+def test_what_follows_on_an_arc_is_the_same_moment_of_its_clip(built):
+    """Two clips of a family, the second one with straighter knees by a tenth."""
+    env = built.environment
+    bend = repeated(clips(env.character)["lower"][0], 2)
+    qpos = bend.qpos.copy()
+    qpos[:, 7:] *= 0.9
+    family = [bend, dataclasses.replace(bend, qpos=qpos)]
+    starts, following = clip_starts([family], (0.0, 0.5), env.character, env.engine, 1000)
+    own = np.asarray(starts.physics.kinematics.qpos)[:, 7:]
+    half = len(own) // 2
+    np.testing.assert_allclose(own[half:], 0.9 * own[:half], atol=1e-6)
+    assert following.angles.shape == (2 * half, 2, FOLLOWING, own.shape[1])
+    # whichever clip it starts on: the next frame of the first, and that of the second
+    for first in (0, half):
+        after = following.angles[first : first + half - 1, :, 0]
+        np.testing.assert_allclose(after[:, 0], own[1:half], atol=1e-6)
+        np.testing.assert_allclose(after[:, 1], own[half + 1 :], atol=1e-6)
+    np.testing.assert_array_equal(following.turns, [0.0, 0.5])
+
+
+def test_targets_of_an_arc_lie_to_its_side():
+    turns, count = np.array([0.0, 1.0, -1.0]), 2000
+    arc = np.repeat(np.arange(3), count)
+    found = np.asarray(rehearsal._bearings(turns, arc, KEY)).reshape(3, count)
+    np.testing.assert_allclose(found.min(axis=1), [-0.5, 0.5, -np.pi], atol=0.01)
+    np.testing.assert_allclose(found.max(axis=1), [0.5, np.pi, -0.5], atol=0.01)
+    (alone,) = np.asarray(rehearsal._bearings(np.zeros(1), arc[:count], KEY)).reshape(1, count)
+    assert alone.min() < -3.0
+    assert alone.max() > 3.0
 
 
 def test_a_meta_policy_knows_its_motion_already():

@@ -5,7 +5,8 @@ and a character that stands still falls least: it comes to rest in some pose of 
 discriminators have little to say against it, or it falls so soon that they are sure of everything.
 So the actor is first taught, by regression, to name servo targets that lead to the clips' next
 pose: in the states that it gets to itself when it starts on the clips (Ross et al. 2011, A
-reduction of imitation learning ... to no-regret online learning). Balance is left to training.
+reduction of imitation learning ... to no-regret online learning). Where there are clips along
+arcs, it learns to go on with the one that turns to the goal's target. Balance is left to training.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from getup_jax.tasks.composite import CompositeState, CompositeTask, CompositeWo
 Log = Callable[[str], None]
 
 _ROUNDS = 4  # of playing and learning; in the first one the clips' own targets are played
+_TURN_S = 1.0  # a target is so long away from straight ahead, at the turn rate of the lesson
 _LOOK_STEPS = 2  # a state is kept every so many steps
 _EPOCHS, _MINIBATCH = 20, 256
 _STD = 0.01  # weight of (log std - the first one)^2 beside the squared error (rad^2)
@@ -68,15 +70,17 @@ def rehearse(
 
 
 def clip_targets(built: BuiltComposite) -> np.ndarray:
-    """Servo targets [P, K - 1, J] (rad) that lead along the clips from every start; NaN: past one.
+    """Servo targets [P, V, K - 1, J] (rad) that lead along the clips from every start.
+
+    V: along which arc; NaN: past the clip.
 
     q(t + dt) + kd / kp dq/dt, since a PD servo with damping lags behind by kd / kp.
     """
-    following, task = built.following, built.environment
+    angles, task = built.following.angles, built.environment
     model = task.character.model
     lag = -model.actuator_biasprm[:, 2] / model.actuator_gainprm[:, 0]
-    rate = np.diff(following, axis=1) / task.engine.control_dt
-    return following[:, :-1] + lag * rate
+    rate = np.diff(angles, axis=2) / task.engine.control_dt
+    return angles[:, :, :-1] + lag * rate
 
 
 def _play(
@@ -90,15 +94,18 @@ def _play(
     """States on the way from starts on the clips, by the actor's own actions or the clips'."""
     env, world = built.environment, built.world
     std = learner.model.initial_std or learner.config.action_std[-1]
-    key_row, key_start, key_noise = jax.random.split(key, 3)
+    key_row, key_start, key_noise, key_arc = jax.random.split(key, 4)
     row = jax.random.randint(key_row, (learner.config.num_envs,), 0, len(targets))
+    arc = jax.random.randint(key_arc, row.shape, 0, targets.shape[1])
     state = env.start(world, row, key_start).replace(key=key_start)
-    way = (targets[row] - np.asarray(world.target_centre)) / np.asarray(world.target_scale)
+    way = (targets[row, arc] - np.asarray(world.target_centre)) / np.asarray(world.target_scale)
     goes_on = np.ones(len(row), bool)
     kept: list[Rehearsed] = []
     for step, key_step in enumerate(jax.random.split(key_noise, way.shape[1])):
         goes_on &= np.isfinite(way[:, step]).all(axis=-1)
         action = jnp.asarray(np.nan_to_num(way[:, step]), jnp.float32)
+        bearing = _bearings(built.following.turns, np.asarray(arc), key_step)
+        state = _TURN(env, world, state, bearing)
         if step % _LOOK_STEPS == 0:
             seen = np.asarray(state.observation)[goes_on]
             kept.append(Rehearsed(seen, np.asarray(action)[goes_on]))
@@ -108,6 +115,30 @@ def _play(
         state, fell = _STEP(env, world, state, action)
         goes_on &= ~np.asarray(fell)
     return Rehearsed(*(np.concatenate(x) for x in zip(*kept, strict=True)))
+
+
+def _bearings(turns: np.ndarray, arc: np.ndarray, key: jax.Array) -> jax.Array:
+    """Where targets [B] (rad) are for those who are to turn as the arcs [B] do.
+
+    Proportional to the rate, anywhere between the neighbouring arcs' halves; behind the body for
+    the fastest ones. With one arc alone: anywhere.
+    """
+    order = np.argsort(turns)
+    inner = (turns[order][1:] + turns[order][:-1]) / 2 * _TURN_S
+    low = np.concatenate([[-math.pi], inner])[np.argsort(order)]
+    high = np.concatenate([inner, [math.pi]])[np.argsort(order)]
+    return jax.random.uniform(key, arc.shape, minval=low[arc], maxval=high[arc])
+
+
+def _turn(
+    env: CompositeTask, world: CompositeWorld, state: CompositeState, bearing: jax.Array
+) -> CompositeState:
+    """The episodes with their targets at the bearings [B] (rad)."""
+    goals = env.goals.toward(state.goals, state.physics.kinematics, bearing)
+    return env.adopt(world, state, goals, state.key)
+
+
+_TURN = jax.jit(_turn, static_argnums=0)
 
 
 def _step(

@@ -17,8 +17,8 @@ from getup_jax.tasks.build_composite import (
     action_centre,
     action_scale,
     assemble_composite,
-    resampled,
 )
+from getup_jax.tasks.clip_starts import resampled
 from getup_jax.tasks.link_frames import FRAMES, LINK_STATE, observe
 from getup_jax.tasks.reference_windows import window_at
 from getup_jax.types import StepOutput

@@ -12,6 +12,7 @@ from tiny_composite import COMPOSITE, CONFIG, squat, wave
 
 from getup_jax.config import ConfigError
 from getup_jax.motion.clips import Clip
+from getup_jax.motion.loops import repeated
 from getup_jax.physics.character import load_character
 from getup_jax.tasks.groups import resolve_groups
 from getup_jax.tasks.reference_windows import (
@@ -20,7 +21,6 @@ from getup_jax.tasks.reference_windows import (
     nearest,
     sample,
     travel,
-    unrolled,
     window_at,
 )
 
@@ -65,7 +65,7 @@ def _slow_window(clip: Clip, group, character, times: np.ndarray) -> np.ndarray:
 def test_windows_inside_jit_equal_numpy(character, upper, references, clip, start, speed):
     window = jax.jit(lambda c, s, p: window_at(references, upper, c, s, p))
     found = window(jnp.asarray([clip]), jnp.asarray([start]), jnp.asarray([speed * DT]))[0]
-    source = unrolled([wave(character), squat(character, fps=25.0)][clip])
+    source = repeated([wave(character), squat(character, fps=25.0)][clip], 2)
     expected = _slow_window(source, upper, character, start + speed * DT * np.arange(5))
     # neighbouring rotations differ by little, so the straight line is nearly the arc
     assert_allclose(found, expected, atol=2e-4)
@@ -120,26 +120,6 @@ def test_travel_is_0_at_rest_and_the_mean_of_the_clips_for_them(character, upper
     row = jnp.zeros(1, jnp.int32)
     window = window_at(moving, group, row, jnp.zeros(1), jnp.full(1, DT))
     assert_allclose(travel(group, window), 4 * DT, rtol=1e-4)
-
-
-def test_a_loop_goes_on_from_where_it_ended(character):
-    """A walk in a circle: the second round starts at the first one's end, turned with it."""
-    count, turn = 31, 0.5
-    qpos = np.tile(character.neutral_qpos, (count, 1))
-    yaw = np.linspace(0.0, turn, count)
-    qpos[:, 0], qpos[:, 1] = np.sin(yaw), 1.0 - np.cos(yaw)
-    qpos[:, 3:7] = Rotation.from_rotvec([[0, 0, y] for y in yaw]).as_quat(scalar_first=True)
-    twice = unrolled(Clip("circle", 30.0, qpos)).qpos
-    assert len(twice) == 2 * count - 1
-    angle = np.linspace(0.0, 2 * turn, 2 * count - 1)
-    assert_allclose(twice[:, :2], np.stack([np.sin(angle), 1 - np.cos(angle)], 1), atol=1e-9)
-    assert_allclose(twice[:, 3], np.cos(angle / 2), atol=1e-9)
-
-
-def test_what_does_not_repeat_is_left_alone(character):
-    clip = squat(character)
-    half = dataclasses.replace(clip, qpos=clip.qpos[:31])
-    assert unrolled(half) is half
 
 
 def test_mistakes_name_the_key(character, upper):

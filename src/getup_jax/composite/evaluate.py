@@ -21,7 +21,8 @@ from getup_jax.config import Config, ConfigError
 from getup_jax.motion.clips import Clip
 from getup_jax.motion.dtw import imitation_error
 from getup_jax.progress import Display
-from getup_jax.tasks.build_composite import BuiltComposite, resampled
+from getup_jax.tasks.build_composite import BuiltComposite
+from getup_jax.tasks.clip_starts import resampled
 from getup_jax.tasks.groups import Group
 from getup_jax.tasks.reference_windows import link_poses
 

@@ -8,6 +8,8 @@ from typing import Any
 
 from getup_jax.config.check import require
 
+FASTEST_TURN = 2.0  # rad/s
+
 
 @dataclasses.dataclass(frozen=True)
 class GroupConfig:
@@ -18,6 +20,9 @@ class GroupConfig:
     frame: str = "heading"  # heading: of the newest root | root: the root's own in every frame
     history: int = 3  # n_i of equation 3; a window has 2 frames more
     speed: tuple[float, ...] = (1.0, 1.0)  # range of the clips' pace, drawn for each window
+    # rad/s, positive to the left: each clip is also bent along an arc on which it turns this fast;
+    # 0 is the clip as it is
+    turns: tuple[float, ...] = (0.0,)
 
     def __post_init__(self) -> None:
         frames = ("heading", "root")
@@ -26,6 +31,9 @@ class GroupConfig:
         require(ok, "composite.groups.*.history", "0 to 3, which the actor sees", self.history)
         ok = len(self.speed) == 2 and 0 < self.speed[0] <= self.speed[1]
         require(ok, "composite.groups.*.speed", "0 < slowest <= fastest", self.speed)
+        ok = bool(self.turns) and max(map(abs, self.turns), default=0.0) <= FASTEST_TURN
+        expected = f"rad/s from -{FASTEST_TURN} to {FASTEST_TURN}, at least one"
+        require(ok, "composite.groups.*.turns", expected, self.turns)
 
 
 @dataclasses.dataclass(frozen=True)

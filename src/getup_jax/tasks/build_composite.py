@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.config import CompositeConfig, Config, ConfigError, TaskConfig
-from getup_jax.motion.clips import Clip
+from getup_jax.config import CompositeConfig, Config, ConfigError, GroupConfig, TaskConfig
+from getup_jax.motion.bend import bent
+from getup_jax.motion.clips import Clip, MotionError
+from getup_jax.motion.loops import repeated
 from getup_jax.motion.named_clips import named_clips
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.engine import make_engine
+from getup_jax.tasks.clip_starts import (
+    Family,
+    Following,
+    clip_starts,
+    families,
+    hinges_of,
+    mixed,
+    resampled,
+)
 from getup_jax.tasks.composite import CompositeTask, CompositeWorld, Starts
 from getup_jax.tasks.goals.combine import equipment_of, make_goals
 from getup_jax.tasks.groups import objective_weights, resolve_groups
-from getup_jax.tasks.link_frames import FRAMES, link_state
-from getup_jax.tasks.reference_windows import make_references, unrolled
-from getup_jax.tasks.references import velocities
-from getup_jax.types import Engine, take
+from getup_jax.tasks.reference_windows import make_references
 
-FOLLOWING = 32  # frames after a start that are kept
 _STILL_RAD = 0.6  # scale of a hinge that the clips do not move
-_MIXES = 8  # starts of every frame of the start group's clips
 _SPREADS = 4.0  # added to it: times the standard deviation of the clips' angles
 
 
@@ -34,8 +40,7 @@ class BuiltComposite:
     environment: CompositeTask
     world: CompositeWorld
     clips: dict[str, list[Clip]]  # by group
-    # [P, FOLLOWING, J] hinge angles (rad) of the frames after each start; NaN: past the clip's end
-    following: np.ndarray
+    following: Following  # how the clips go on after the start states
 
 
 def build_composite(config: Config, log: Callable[[str], None]) -> BuiltComposite:
@@ -70,10 +75,12 @@ def assemble_composite(
         for group in groups
     }
     start = composite.start_group or groups[-1].name
-    moving = [resampled(unrolled(clip), 1.0 / engine.control_dt) for clip in clips[start]]
+    turns = composite.groups[start].turns
+    again = [resampled(repeated(clip, 2), 1.0 / engine.control_dt) for clip in clips[start]]
+    moving: list[Family] = list(families(again, turns))
     if composite.start_mixed:
         moving = mixed(moving, start, composite, character, clips)
-    starts, following = _starts(moving, character, engine, config.task.pool_size)
+    starts, following = clip_starts(moving, turns, character, engine, config.task.pool_size)
     _check_starts(task, starts, f"composite.groups.{start}.clips")
     log(f"engine: {engine.name}; {len(starts.history)} start states along {start}'s clips")
     world = CompositeWorld(
@@ -132,94 +139,22 @@ def _own_hinges(
     config: CompositeConfig, character: CharacterSpec, clips: dict[str, list[Clip]]
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Of every group: its hinges [J] bool, and their angles [frames, hinges] in its clips."""
-    for name, own in _hinges_of(config, character):
+    for name, own in hinges_of(config, character):
         frames = np.concatenate([clip.qpos[:, 7:] for clip in clips[name]])
         yield own, frames[:, own]
 
 
-def _hinges_of(
-    config: CompositeConfig, character: CharacterSpec
-) -> Iterator[tuple[str, np.ndarray]]:
-    """Of every group: its name and its hinges [J] bool; of two with one link the first is last."""
-    for group in reversed(resolve_groups(config, character)):
-        yield group.name, np.isin(character.joint_link, group.links)
-
-
 def load_clips(config: CompositeConfig, character: CharacterSpec) -> dict[str, list[Clip]]:
-    """The clips of every group."""
-    return {
-        name: named_clips(part.clips, character, f"composite.groups.{name}.clips")
-        for name, part in config.groups.items()
-    }
+    """The clips of every group, each along all of the group's arcs before the next one."""
+    return {name: _load_group(name, part, character) for name, part in config.groups.items()}
 
 
-def mixed(
-    moving: Sequence[Clip],
-    start: str,
-    config: CompositeConfig,
-    character: CharacterSpec,
-    clips: dict[str, list[Clip]],
-) -> list[Clip]:
-    """The start group's clips, each _MIXES times with the other groups' hinges from their clips.
-
-    These begin anywhere; all are at the same rate. Otherwise an arm starts where the clip of the
-    legs has it, and episodes begin with a motion that no clip of the arm has.
-    """
-    rng = np.random.default_rng(0)
-    found = []
-    for clip in moving:
-        for _ in range(_MIXES):
-            qpos = clip.qpos.copy()
-            for name, own in _hinges_of(config, character):
-                if name != start:
-                    other = clips[name][rng.integers(len(clips[name]))]
-                    loop = resampled(other, clip.fps).qpos[:-1, 7:]
-                    row = (rng.integers(len(loop)) + np.arange(len(qpos))) % len(loop)
-                    qpos[:, 7:][:, own] = loop[row][:, own]
-            found.append(dataclasses.replace(clip, qpos=qpos))
-    return found
-
-
-def _starts(
-    clips: Sequence[Clip], character: CharacterSpec, engine: Engine, most: int
-) -> tuple[Starts, np.ndarray]:
-    """Every frame of clips at the control rate that has enough before it; at most `most`.
-
-    Also what follows each of them, see `BuiltComposite`.
-    """
-    qpos, qvel, rows, ends, count = [], [], [], [], 0
-    for moving in clips:
-        qvel.append(velocities(moving, character))
-        qpos.append(moving.qpos[:-1])
-        rows.append(count + np.arange(FRAMES, len(qpos[-1])))
-        count += len(qpos[-1])
-        ends.append(np.full(len(rows[-1]), count))
-    chosen, end = np.concatenate(rows), np.concatenate(ends)
-    kept = np.linspace(0, len(chosen) - 1, min(most, len(chosen))).astype(int)
-    chosen, end = chosen[kept], end[kept]
-    places = np.concatenate(qpos)
-    physics = engine.place(places, np.concatenate(qvel))
-    frames = link_state(physics.kinematics)
-    before = chosen[:, None] + np.arange(-FRAMES, 1)
-    after = chosen[:, None] + np.arange(1, FOLLOWING + 1)
-    following = places[np.minimum(after, len(places) - 1), 7:]
-    following[after >= end[:, None]] = np.nan
-    return Starts(physics=take(physics, jnp.asarray(chosen)), history=frames[before]), following
-
-
-def resampled(clip: Clip, fps: float) -> Clip:
-    """A clip at another rate, by linear interpolation and normalised quaternions."""
-    if abs(clip.fps - fps) < 1e-6:
-        return clip
-    times = np.arange(0.0, clip.duration + 1e-9, 1.0 / fps)
-    place = np.minimum(times * clip.fps, len(clip.qpos) - 1)
-    low = np.minimum(np.floor(place).astype(int), len(clip.qpos) - 2)
-    share = (place - low)[:, None]
-    before, after = clip.qpos[low], clip.qpos[low + 1].copy()
-    after[:, 3:7] *= np.where(np.sum(before[:, 3:7] * after[:, 3:7], axis=1) < 0, -1, 1)[:, None]
-    qpos = (1 - share) * before + share * after
-    qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=1, keepdims=True)
-    return dataclasses.replace(clip, qpos=qpos, fps=fps)
+def _load_group(name: str, config: GroupConfig, character: CharacterSpec) -> list[Clip]:
+    clips = named_clips(config.clips, character, f"composite.groups.{name}.clips")
+    try:
+        return [bent(clip, turn, character) for clip in clips for turn in config.turns]
+    except MotionError as error:
+        raise ConfigError(f"composite.groups.{name}.turns: {error}") from None
 
 
 def _check_starts(task: CompositeTask, starts: Starts, key: str) -> None:

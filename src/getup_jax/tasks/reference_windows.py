@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 
 import jax
@@ -13,11 +12,10 @@ from flax import struct
 
 from getup_jax.config import ConfigError
 from getup_jax.motion.clips import Clip
+from getup_jax.motion.loops import repeated
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.tasks.groups import Group
 
-_LOOP_RAD = 0.05  # a clip whose first and last pose differ by less repeats
-_LOOP_M = 0.02
 _POSES = 256  # frames that `nearest` looks at, at most
 _WINDOWS = 1024  # that the clips' mean travel is taken over
 
@@ -47,7 +45,7 @@ def make_references(
         raise ConfigError(f"{key}: expected at least one clip, got none")
     for clip in clips:
         _check(clip, group, character, control_dt, key)
-    clips = [unrolled(clip) for clip in clips]
+    clips = [repeated(clip, 2) for clip in clips]
     counts = [len(clip.qpos) for clip in clips]
     position, quaternion = link_poses(np.concatenate([clip.qpos for clip in clips]), character)
     some = np.linspace(0, len(position) - 1, min(_POSES, len(position))).astype(int)
@@ -110,24 +108,6 @@ def travel(group: Group, window: jax.Array) -> jax.Array:
     return jnp.mean(gap, axis=-1)
 
 
-def unrolled(clip: Clip) -> Clip:
-    """A clip that ends in its first pose, once more after itself and moved on; others as is."""
-    first, last = clip.qpos[0], clip.qpos[-1]
-    same = np.abs(first[7:] - last[7:]).max() < _LOOP_RAD and abs(first[2] - last[2]) < _LOOP_M
-    if not same or clip.duration <= 0:
-        return clip
-    turn, moved = np.zeros(4), np.zeros(3)
-    mujoco.mju_negQuat(turn, first[3:7])
-    mujoco.mju_mulQuat(turn, last[3:7].copy(), turn.copy())
-    turn = _about_z(turn)
-    again = clip.qpos[1:].copy()
-    for row in again:
-        mujoco.mju_rotVecQuat(moved, row[:3] - first[:3], turn)
-        row[:3] = last[:3] + moved
-        mujoco.mju_mulQuat(row[3:7], turn, row[3:7].copy())
-    return dataclasses.replace(clip, qpos=np.concatenate([clip.qpos, again]))
-
-
 def link_poses(qpos: np.ndarray, character: CharacterSpec) -> tuple[np.ndarray, np.ndarray]:
     """Positions [M, L, 3] and quaternions [M, L, 4] of the links in poses [M, 7 + J], float32."""
     data, links = mujoco.MjData(character.model), len(character.link_names)
@@ -150,13 +130,6 @@ def _turn_between(table: jax.Array, row: jax.Array, share: jax.Array) -> jax.Arr
     same_side = jnp.sum(before * after, axis=-1, keepdims=True) >= 0.0
     mixed = (1.0 - share) * before + share * jnp.where(same_side, after, -after)
     return mixed / jnp.linalg.norm(mixed, axis=-1, keepdims=True)
-
-
-def _about_z(q: np.ndarray) -> np.ndarray:
-    """The twist of q about the vertical."""
-    twist = np.array([q[0], 0.0, 0.0, q[3]])
-    norm = np.linalg.norm(twist)
-    return twist / norm if norm > 1e-6 else np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def _check(clip: Clip, group: Group, character: CharacterSpec, control_dt: float, key: str) -> None:

@@ -124,6 +124,27 @@ def test_a_new_place_is_within_reach():
     assert pace.max() <= 1.5 + 1e-5
 
 
+def test_slack_brings_places_nearer():
+    many = jax.tree.map(lambda x: jnp.repeat(x, 200, axis=0), kinematics())
+    slow = TargetLocation(DT, slack=2.0)
+    state, far = jax.jit(slow.reset)(KEY, many), jax.jit(LOCATION.reset)(KEY, many)
+    np.testing.assert_array_equal(state.time_left, far.time_left)
+    np.testing.assert_allclose(2.0 * state.place, far.place, rtol=1e-5)
+
+
+def test_targets_are_turned_to_a_bearing():
+    """The character at (1, 0) faces +y; 90 degrees to its left is -x."""
+    goals = Goals((LOCATION, HEADING, AIMING))
+    seen = kinematics(position={"pelvis": (1.0, 0.0, 0.9)}, yaw=np.pi / 2)
+    states = (location_state((4.0, 4.0), 2.0), heading_state(), AIMING.reset(KEY, seen))
+    turned = goals.toward(states, seen, jnp.full(1, np.pi / 2))
+    np.testing.assert_allclose(turned[0].place, [[1.0 - 5.0, 0.0]], atol=1e-5)
+    assert turned[0].time_left == states[0].time_left
+    np.testing.assert_allclose(turned[1].direction, [[-1.0, 0.0]], atol=1e-6)
+    assert turned[1].speed == states[1].speed
+    assert turned[2] is states[2]  # an arm's direction, not one on the floor
+
+
 @pytest.mark.parametrize(
     ("hand", "expected"),
     [

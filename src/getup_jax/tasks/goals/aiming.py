@@ -76,6 +76,10 @@ class Aiming:
         state = select(state.time_left <= 0.0, self.reset(key, kinematics), state)
         return state, GoalOutput(reward, never(kinematics), no_event(kinematics))
 
+    def toward(self, state: AimingState, kinematics: Kinematics, bearing: jax.Array) -> AimingState:
+        """No direction on the floor."""
+        return state
+
     def observe(self, state: AimingState, kinematics: Kinematics) -> jax.Array:
         """The direction in the heading frame 3."""
         return heading_frame(kinematics, state.direction)

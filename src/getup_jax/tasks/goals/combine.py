@@ -69,6 +69,13 @@ class Goals:
             outputs.append(output)
         return tuple(after), tuple(outputs)
 
+    def toward(
+        self, states: tuple[Any, ...], kinematics: Kinematics, bearing: jax.Array
+    ) -> tuple[Any, ...]:
+        """The states with their targets at a bearing [B] (rad), where they have a direction."""
+        seen = zip(self.goals, states, self._seen(kinematics), strict=True)
+        return tuple(goal.toward(state, kin, bearing) for goal, state, kin in seen)
+
     def observe(self, states: tuple[Any, ...], kinematics: Kinematics) -> jax.Array:
         """All goal states g side by side [B, sum of G]."""
         parts = [

@@ -56,6 +56,13 @@ class Goal(Protocol):
         """After a control step: its reward, and the state with any new target."""
         ...
 
+    def toward(self, state: Any, kinematics: Kinematics, bearing: jax.Array) -> Any:
+        """The state with its target at a bearing [B] (rad, left of where the root faces).
+
+        A goal without a direction on the floor stays as it is.
+        """
+        ...
+
     def observe(self, state: Any, kinematics: Kinematics) -> jax.Array:
         """The goal state g [B, G] of the policy, in the heading frame of the root."""
         ...

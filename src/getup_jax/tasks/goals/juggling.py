@@ -96,6 +96,12 @@ class Juggling:
             leaving=jnp.where(release, holder, NONE),
         ), output
 
+    def toward(
+        self, state: JugglingState, kinematics: Kinematics, bearing: jax.Array
+    ) -> JugglingState:
+        """No direction on the floor."""
+        return state
+
     def observe(self, state: JugglingState, kinematics: Kinematics) -> jax.Array:
         """Balls from the root 9, their velocities 9, holders 6, time to the releases 2."""
         command = self.command(state, kinematics)

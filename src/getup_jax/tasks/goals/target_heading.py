@@ -23,6 +23,7 @@ from getup_jax.tasks.goals.goal import (
     floor_frame,
     never,
     no_event,
+    root_heading,
     uniform,
     yaw_ahead,
 )
@@ -72,6 +73,12 @@ class TargetHeading:
         state = state.replace(time_left=state.time_left - self.control_dt)
         state = select(state.time_left <= 0.0, self.reset(key, kinematics), state)
         return state, GoalOutput(reward, never(kinematics), no_event(kinematics))
+
+    def toward(
+        self, state: HeadingState, kinematics: Kinematics, bearing: jax.Array
+    ) -> HeadingState:
+        """Go along the bearing, at the same speed."""
+        return state.replace(direction=floor_direction(root_heading(kinematics) + bearing))
 
     def observe(self, state: HeadingState, kinematics: Kinematics) -> jax.Array:
         """Direction in the heading frame 2, speed 1."""

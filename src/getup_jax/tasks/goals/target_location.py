@@ -19,6 +19,7 @@ from getup_jax.tasks.goals.goal import (
     floor_direction,
     floor_frame,
     never,
+    root_heading,
     uniform,
     yaw_ahead,
 )
@@ -45,6 +46,7 @@ class TargetLocation:
     control_dt: float
     speed: tuple[float, float] = (1.2, 1.5)  # m/s; walking. Running: 2, 4
     time: tuple[float, float] = (3.0, 5.0)  # s to get there; the distance is a drawn speed times it
+    slack: float = 1.0  # the time is so many times what the distance takes at the drawn speed
     turn: float = 3.141592653589793  # rad, the largest angle between the heading and the target
     radius_m: float = 0.5  # within it the target is reached
 
@@ -54,12 +56,12 @@ class TargetLocation:
     orders: ClassVar[dict[str, tuple[int, Any]]] = {"place": (2, REQUIRED), "within_s": (1, 4.0)}
 
     def reset(self, key: jax.Array, kinematics: Kinematics) -> LocationState:
-        """A place that can be reached in time at a speed of the range."""
+        """A place that can be reached in time at a speed of the range, and sooner with slack."""
         key_turn, key_speed, key_time = jax.random.split(key, 3)
         count = len(kinematics.finite)
         direction = floor_direction(yaw_ahead(key_turn, kinematics, self.turn))
         time = uniform(key_time, count, self.time)
-        distance = time * uniform(key_speed, count, self.speed)
+        distance = time * uniform(key_speed, count, self.speed) / self.slack
         return LocationState(
             place=kinematics.link_position[:, 0, :2] + direction * distance[:, None],
             time_left=time,
@@ -82,6 +84,15 @@ class TargetLocation:
         success = jnp.where(over, state.reached.astype(jnp.float32), jnp.nan)
         state = select(over, self.reset(key, kinematics), state)
         return state, GoalOutput(reward, never(kinematics), success)
+
+    def toward(
+        self, state: LocationState, kinematics: Kinematics, bearing: jax.Array
+    ) -> LocationState:
+        """Be as far away as before, at the bearing."""
+        _, distance = self._way(state, kinematics)
+        direction = floor_direction(root_heading(kinematics) + bearing)
+        root = kinematics.link_position[:, 0, :2]
+        return state.replace(place=root + direction * distance[:, None])
 
     def observe(self, state: LocationState, kinematics: Kinematics) -> jax.Array:
         """Direction in the heading frame 2, speed that arrives in time 1, distance 1."""

@@ -130,6 +130,10 @@ class TennisSwing:
         miss = jnp.linalg.norm(landing(position, velocity) - goal, axis=-1) / self.spread_m
         return jnp.exp(-3.0 * jnp.square(lack)) * jnp.exp(-jnp.square(miss))
 
+    def toward(self, state: TennisState, kinematics: Kinematics, bearing: jax.Array) -> TennisState:
+        """No direction on the floor."""
+        return state
+
     def observe(self, state: TennisState, kinematics: Kinematics) -> jax.Array:
         """Ball from the root 3, its velocity 3, destination 2, time to the next 1, still due 1."""
         position, velocity = self._ball(kinematics)
