@@ -25,6 +25,7 @@ LAYERS = [
     ["loop", "train"],
     ["conditions", "naturalness", "episodes", "scores", "score_table", "video", "eval_plot"],
     ["composite"],
+    ["composite_card"],
     ["evaluate", "model_card", "export", "search"],
     ["eval_options"],
     ["cli", "editor"],

@@ -63,11 +63,6 @@ def export(
 
 def _evaluation(file: Path, loaded: LoadedPolicy) -> Mapping[str, Any]:
     """What `getup-eval --json` wrote, of the same policy."""
-    if loaded.config.composite_motion:
-        raise ConfigError(
-            f"--eval: {file}: a card has no tables of composite motion; export without, and write "
-            "the numbers into it"
-        )
     try:
         result = json.loads(file.read_text(encoding="utf-8"))
         found = [result["policy"].get(key) for key in ("iteration", "steps", "seed")]
@@ -82,6 +77,8 @@ def _evaluation(file: Path, loaded: LoadedPolicy) -> Mapping[str, Any]:
             f"--eval: {file}: is of iteration, steps and seed {found}, but {loaded.path} is of "
             f"{expected}; evaluate what is exported"
         )
+    if ("imitation_error_m" in result) != loaded.config.composite_motion:
+        raise ConfigError(f"--eval: {file}: is of another task than {loaded.path}")
     return result
 
 

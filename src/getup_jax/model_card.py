@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from getup_jax import composite_card
 from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.progress import duration
 
@@ -15,8 +16,7 @@ _UNKNOWN = "unknown"
 _CARD = """\
 # {title}
 
-A policy of getup_jax that gets a simulated humanoid up from the floor. This folder holds its
-weights, its pose prior and every setting (config.yaml); checkpoint.json has a digest of each file.
+{purpose}
 
     getup-eval --ckpt {folder}
 
@@ -28,8 +28,7 @@ weights, its pose prior and every setting (config.yaml); checkpoint.json has a d
 
 ## Numbers
 
-Without action noise; success is rising from lying without an early end and standing for the
-whole standing phase. In brackets: 95 % Wilson interval.
+{meaning}
 
 {numbers}
 
@@ -37,6 +36,14 @@ whole standing phase. In brackets: 95 % Wilson interval.
 
 {limits}
 """
+
+_PURPOSE = """\
+A policy of getup_jax that gets a simulated humanoid up from the floor. This folder holds its
+weights, its pose prior and every setting (config.yaml); checkpoint.json has a digest of each
+file."""
+_MEANING = """\
+Without action noise; success is rising from lying without an early end and standing for the
+whole standing phase. In brackets: 95 % Wilson interval."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,14 +63,30 @@ def model_card(
     evaluations: Sequence[Mapping[str, Any]],
 ) -> str:
     """The text; evaluations are those that `getup-eval --json` wrote."""
-    training = _training(loaded, provenance)
+    composite = loaded.config.composite_motion
+    data = composite_card.data(loaded) if composite else _data(loaded)
+    training = data | _training(loaded, provenance)
+    numbers = composite_card.numbers if composite else _numbers
+    limits = composite_card.limits() if composite else _limits(loaded, evaluations)
+    if not evaluations:
+        limits.append("How well it does has not been measured.")
     return _CARD.format(
         title=f"Policy `{name}`",
+        purpose=composite_card.PURPOSE if composite else _PURPOSE,
         folder=name,
         training="\n".join(f"| {key} | {value} |" for key, value in training.items()),
-        numbers="\n\n".join(map(_numbers, evaluations)) or "Not evaluated yet.",
-        limits="\n".join(f"- {limit}" for limit in _limits(loaded, evaluations)),
+        meaning=composite_card.MEANING if composite else _MEANING,
+        numbers="\n\n".join(map(numbers, evaluations)) or "Not evaluated yet.",
+        limits="\n".join(f"- {limit}" for limit in limits),
     )
+
+
+def _data(loaded: LoadedPolicy) -> dict[str, str]:
+    motion = loaded.config.motion
+    return {
+        "data": f"motions {', '.join(motion.source)}",
+        "curves": ", ".join(motion.curves) or "all of them",
+    }
 
 
 def _training(loaded: LoadedPolicy, provenance: Provenance) -> dict[str, str]:
@@ -71,8 +94,6 @@ def _training(loaded: LoadedPolicy, provenance: Provenance) -> dict[str, str]:
     wall_s = provenance.wall_s
     began = {} if provenance.before is None else {"started from": provenance.before}
     return {
-        "data": f"motions {', '.join(config.motion.source)}",
-        "curves": ", ".join(config.motion.curves) or "all of them",
         "control steps": _UNKNOWN if steps is None else f"{steps:,}",
         **began,
         "wall time": _UNKNOWN if wall_s is None else duration(wall_s),
@@ -144,6 +165,4 @@ def _limits(loaded: LoadedPolicy, evaluations: Sequence[Mapping[str, Any]]) -> l
         limits.append(
             f"Curves that succeed in less than {LOW_SUCCESS:.0%}: {', '.join(sorted(weak))}."
         )
-    if not evaluations:
-        limits.append("How well it does has not been measured.")
     return limits

@@ -1,0 +1,65 @@
+"""Model cards of composite motion; those of getting up are tested with the evaluation."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from getup_jax.checkpoint import load_policy
+from getup_jax.config import ConfigError
+from getup_jax.export import CARD, export
+from getup_jax.paths import asset_path
+
+WALK = asset_path("checkpoints", "walk")
+
+
+@pytest.fixture
+def result():
+    """What `getup-eval --json` writes of it, with numbers that are easy to find."""
+    loaded = load_policy(WALK)
+    return {
+        "goals": {"target_location": {"reward": 0.625, "success": 0.875}},
+        "imitation_error_m": {"body": {"mean": 0.0324, "std": 0.0111, "travel": 1.04}},
+        "meta_weight": {},
+        "ratio": 1.0,
+        "fall_share": 0.25,
+        "episodes": 8,
+        "policy": {"seed": loaded.config.seed, **loaded.metadata},
+    }
+
+
+def test_a_card_of_composite_motion_has_its_groups_and_goals(tmp_path, result):
+    file = tmp_path / "eval.json"
+    file.write_text(json.dumps(result))
+    card = (export(WALK, tmp_path / "policy", [file]) / CARD).read_text()
+    for expected in (
+        "| clips | body: walk |",
+        "| goals | target_location |",
+        "| body | 0.032 ± 0.011 | 1.04 |",
+        "| target_location | 0.625 | 88% |",
+        "25% of the episodes have a fall.",
+    ):
+        assert expected in card
+    assert "lying" not in card
+    assert "not been measured" not in card
+
+
+def test_goals_without_attempts_and_several_groups(tmp_path, result):
+    result["goals"]["target_location"]["success"] = None
+    result["imitation_error_m"]["arm"] = {"mean": 0.01, "std": 0.0, "travel": 0.5}
+    result["ratio"] = 3.24
+    file = tmp_path / "eval.json"
+    file.write_text(json.dumps(result))
+    card = (export(WALK, tmp_path / "policy", [file]) / CARD).read_text()
+    assert "| target_location | 0.625 | - |" in card
+    assert "the largest error is 3.2 times the smallest" in card
+
+
+def test_an_evaluation_of_another_task_is_refused(tmp_path, result):
+    del result["imitation_error_m"]
+    file = tmp_path / "eval.json"
+    file.write_text(json.dumps(result))
+    with pytest.raises(ConfigError, match=r"--eval: .*eval\.json: is of another task"):
+        export(WALK, tmp_path / "policy", [file])
+    assert not (tmp_path / "policy").exists()
