@@ -73,19 +73,19 @@ def _carry_over(learner: Learner, world: World, seed: int) -> CarryOver:
 def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Job]:
     """The task, and the learner and the world of composite motion."""
     built = build_composite(config, log)
-    env, world = built.environment, built.world
-    if env.config.meta is not None:
-        log(f"meta policy: {env.config.meta}")
+    env, world, composite = built.environment, built.world, built.environment.config
+    if composite.meta is not None:
+        log(f"meta policy: {composite.meta}")
         env, world = with_meta(config, built)
     learner = make_learner(
         env,
         config.network,
         config.ppo,
         total_steps=config.train.total_steps,
-        objectives=make_objectives(built.environment, built.environment.config),
+        objectives=make_objectives(built.environment, composite),
     )
     prepare = None
-    if env.config.rehearse:
+    if composite.rehearse:
         prepare = functools.partial(_rehearse, learner, built, config.seed)
     return built, Job(learner=learner, world=world, prior=None, prepare=prepare)
 

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from probes import Probe
 from tiny_composite import CONFIG, tiny_composite
 
+from getup_jax import train
 from getup_jax.algo.actor_critic import META_LOGIT, make_actor_critic, normalized, observe
 from getup_jax.algo.learner import make_learner
 from getup_jax.algo.meta_chain import with_meta
@@ -107,6 +108,22 @@ def test_a_meta_action_reaches_the_pose_that_its_own_policy_would(trained):
     drawn = jax.jit(task.meta_action)(meta_world, observation, jax.random.key(0))
     assert np.abs(np.asarray(drawn - action)).max() > 1e-3
     assert task.observation_size == env.observation_size + 28
+
+
+@pytest.mark.parametrize("has_meta", [True, False])
+def test_a_job_has_the_meta_policy_or_a_rehearsal(trained, monkeypatch, has_meta):
+    built, _, _, path = trained
+    config = _config(path) if has_meta else CONFIG
+    composite = dataclasses.replace(config.composite, rehearse=not has_meta)
+    env = dataclasses.replace(built.environment, config=composite)
+    made = dataclasses.replace(built, environment=env)
+    monkeypatch.setattr(train, "build_composite", lambda *_: made)
+    monkeypatch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
+    log: list[str] = []
+    _, job = train.build_composite_job(config, log.append)
+    assert (job.prepare is None) == has_meta
+    assert any(f"meta policy: {path}" in line for line in log) == has_meta
+    assert (job.learner.env is env) != has_meta
 
 
 def test_a_meta_policy_of_another_character_or_task_is_refused(trained, tmp_path):

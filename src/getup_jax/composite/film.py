@@ -18,7 +18,8 @@ from getup_jax.tasks.goals import Marker
 def film(path: Path, built: BuiltComposite, episodes: CompositeEpisodes) -> None:
     """The first episodes one after the other; markers show what their goals ask for."""
     env = built.environment
-    names = " + ".join(", ".join(c.name for c in found) for found in built.clips.values())
+    groups = env.config.groups.values()
+    names = " + ".join(", ".join(Path(name).stem for name in group.clips) for group in groups)
     scenes = []
     for episode, qpos in enumerate(episodes.qpos[:FILMED]):
         shown = markers(env, episodes, episode)
