@@ -11,7 +11,6 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
 from getup_jax.motion.clips import Clip, MotionError
@@ -131,9 +130,9 @@ def _stances(edges: np.ndarray, fps: float) -> list[tuple[int, int]]:
     speed = np.linalg.norm(np.gradient(edges[..., :2], 1.0 / fps, axis=0), axis=-1)
     low = edges[..., 2] - edges[..., 2].min() < _NEAR_M
     stands = np.any(low & (speed < _SLOW_M_S), axis=1)
-    spans = ndimage.find_objects(ndimage.label(stands)[0])
-    found = [(span.start, span.stop - 1) for (span,) in spans]
-    return [(first, last) for first, last in found if last - first >= _STAND_S * fps]
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(int)))
+    found = changes.reshape(-1, 2)  # where a time begins, and the first frame after it
+    return [(int(a), int(b) - 1) for a, b in found if b - 1 - a >= _STAND_S * fps]
 
 
 def _held(place: np.ndarray, stances: list[tuple[int, int]]) -> np.ndarray:
