@@ -12,7 +12,8 @@ from tiny_composite import COMPOSITE, CONFIG, clips, tiny_composite
 
 from getup_jax import rehearsal
 from getup_jax.algo.learner import make_learner
-from getup_jax.config import ConfigError
+from getup_jax.algo.meta_chain import with_meta
+from getup_jax.checkpoint import save_learner
 from getup_jax.motion.loops import repeated
 from getup_jax.physics.character import load_character
 from getup_jax.tasks.clip_starts import FOLLOWING, Following, clip_starts
@@ -70,7 +71,8 @@ def test_the_actor_comes_to_name_the_clips_targets(built, monkeypatch):
         return float(np.sqrt(np.mean(np.square(target - targets))))
 
     log: list[str] = []
-    after = rehearsal.rehearse(learner, built, policy, KEY, log.append)
+    stage = rehearsal.Stage(built, built.world)
+    after = rehearsal.rehearse(learner, stage, policy, KEY, log.append)
     assert miss(after) < 0.5 * miss(policy)
     std = learner.model.distribution(after.actor, jnp.zeros_like(observation), jnp.ones(()))[1]
     np.testing.assert_allclose(std, CONFIG.network.initial_std, rtol=0.5)
@@ -108,6 +110,30 @@ def test_targets_of_an_arc_lie_to_its_side():
     assert alone.max() > 3.0
 
 
-def test_a_meta_policy_knows_its_motion_already():
-    with pytest.raises(ConfigError, match=r"composite\.rehearse: expected false"):
-        dataclasses.replace(COMPOSITE, rehearse=True, meta="runs/walk")
+def test_over_a_meta_policy_only_the_new_clips_are_learned(built, monkeypatch, tmp_path):
+    monkeypatch.setattr(rehearsal, "_MINIBATCH", 16)
+    monkeypatch.setattr(rehearsal, "_ROUNDS", 2)
+    monkeypatch.setattr(rehearsal, "_EPOCHS", 150)
+    monkeypatch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
+    trained = make_learner(built.environment, CONFIG.network, CONFIG.ppo, total_steps=1000)
+    item = {"policy": trained.init_learner(jax.random.PRNGKey(5)).policy, "prior": None}
+    meta = str(save_learner(tmp_path / "checkpoints", 1, {"none": np.zeros(1)}, CONFIG, item))
+    config = dataclasses.replace(CONFIG, composite=dataclasses.replace(COMPOSITE, meta=meta))
+    env, world = with_meta(config, built)
+    learner = make_learner(env, CONFIG.network, CONFIG.ppo, total_steps=1000)
+    policy = learner.init_learner(KEY).policy
+    new = np.arange(env.action_size) < 10
+    row = jnp.arange(8)
+    start = built.environment.start(built.world, row, KEY)
+    observation = env.adopt(world, start, start.goals, KEY).observation
+    clip = rehearsal.clip_targets(built)[row, 0, 0] - built.world.target_centre
+    wanted = np.where(new, clip / built.world.target_scale, observation[:, -env.action_size :])
+
+    def miss(policy) -> np.ndarray:
+        gap = built.world.target_scale * (learner.act(policy, observation) - wanted)
+        return np.sqrt(np.mean(np.square(gap), axis=0))
+
+    stage = rehearsal.Stage(built, world, new)
+    after = rehearsal.rehearse(learner, stage, policy, KEY, lambda text: None)
+    assert miss(after)[new].mean() < 0.5 * miss(policy)[new].mean()
+    assert miss(after)[~new].mean() < miss(policy)[~new].mean()

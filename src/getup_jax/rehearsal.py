@@ -7,6 +7,8 @@ So the actor is first taught, by regression, to name servo targets that lead to 
 pose: in the states that it gets to itself when it starts on the clips (Ross et al. 2011, A
 reduction of imitation learning ... to no-regret online learning). Where there are clips along
 arcs, it learns to go on with the one that turns to the goal's target. Balance is left to training.
+
+Over a meta policy it learns the clips that are new, and to leave the other hinges to that policy.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ from getup_jax.algo.learner import Learner
 from getup_jax.algo.state import PolicyState
 from getup_jax.nets import gaussian
 from getup_jax.tasks.build_composite import BuiltComposite
-from getup_jax.tasks.composite import CompositeState, CompositeTask, CompositeWorld
+from getup_jax.tasks.composite import CompositeWorld
+from getup_jax.tasks.goals.combine import Goals
 
 Log = Callable[[str], None]
 
@@ -44,17 +47,27 @@ class Rehearsed(NamedTuple):
     action: Any  # [N, A]
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Stage:
+    """Where it is rehearsed."""
+
+    built: BuiltComposite
+    world: Any  # of the learner's environment: the task's, or with a meta policy
+    new: np.ndarray | None = None  # [A] hinges that the meta policy does not know; None: no policy
+
+
 def rehearse(
-    learner: Learner, built: BuiltComposite, policy: PolicyState, key: jax.Array, log: Log
+    learner: Learner, stage: Stage, policy: PolicyState, key: jax.Array, log: Log
 ) -> PolicyState:
     """The policy with an actor that goes on with the clips, and statistics of what it saw."""
+    built = stage.built
     log("rehearsing: teaching the actor what comes next in the clips ...")
     targets = clip_targets(built)
     parts: list[Rehearsed] = []
     before = math.nan
     for number, key_round in enumerate(jax.random.split(key, _ROUNDS)):
         key_play, key_order = jax.random.split(key_round)
-        part = _play(learner, built, policy, targets, key_play, own=number > 0)
+        part = _play(learner, stage, policy, targets, key_play, own=number > 0)
         parts.append(part)
         if number == 0:
             policy = observe(policy, jnp.asarray(part.observation))
@@ -85,34 +98,39 @@ def clip_targets(built: BuiltComposite) -> np.ndarray:
 
 def _play(
     learner: Learner,
-    built: BuiltComposite,
+    stage: Stage,
     policy: PolicyState,
     targets: np.ndarray,
     key: jax.Array,
     own: bool,
 ) -> Rehearsed:
     """States on the way from starts on the clips, by the actor's own actions or the clips'."""
-    env, world = built.environment, built.world
+    built, world = stage.built, stage.built.world
+    env: Any = learner.env  # CompositeTask, or MetaTask around it
     std = learner.model.initial_std or learner.config.action_std[-1]
     key_row, key_start, key_noise, key_arc = jax.random.split(key, 4)
     row = jax.random.randint(key_row, (learner.config.num_envs,), 0, len(targets))
     arc = jax.random.randint(key_arc, row.shape, 0, targets.shape[1])
-    state = env.start(world, row, key_start).replace(key=key_start)
+    start = built.environment.start(world, row, key_start)
+    state = env.adopt(stage.world, start, start.goals, key_start)
     way = (targets[row, arc] - np.asarray(world.target_centre)) / np.asarray(world.target_scale)
     goes_on = np.ones(len(row), bool)
     kept: list[Rehearsed] = []
     for step, key_step in enumerate(jax.random.split(key_noise, way.shape[1])):
         goes_on &= np.isfinite(way[:, step]).all(axis=-1)
         action = jnp.asarray(np.nan_to_num(way[:, step]), jnp.float32)
-        bearing = _bearings(built.following.turns, np.asarray(arc), key_step)
-        state = _TURN(env, world, state, bearing)
+        if stage.new is None:
+            bearing = _bearings(built.following.turns, np.asarray(arc), key_step)
+            state = _TURN(env, stage.world, state, built.environment.goals, bearing)
+        else:
+            action = jnp.where(stage.new, action, state.observation[:, -env.action_size :])
         if step % _LOOK_STEPS == 0:
             seen = np.asarray(state.observation)[goes_on]
             kept.append(Rehearsed(seen, np.asarray(action)[goes_on]))
         if own:
             action = jax.jit(learner.act)(policy, state.observation)
         action = gaussian.sample(key_step, action, jnp.full_like(action, std))
-        state, fell = _STEP(env, world, state, action)
+        state, fell = _STEP(env, stage.world, state, action)
         goes_on &= ~np.asarray(fell)
     return Rehearsed(*(np.concatenate(x) for x in zip(*kept, strict=True)))
 
@@ -130,20 +148,16 @@ def _bearings(turns: np.ndarray, arc: np.ndarray, key: jax.Array) -> jax.Array:
     return jax.random.uniform(key, arc.shape, minval=low[arc], maxval=high[arc])
 
 
-def _turn(
-    env: CompositeTask, world: CompositeWorld, state: CompositeState, bearing: jax.Array
-) -> CompositeState:
+def _turn(env: Any, world: Any, state: Any, goals: Goals, bearing: jax.Array) -> Any:
     """The episodes with their targets at the bearings [B] (rad)."""
-    goals = env.goals.toward(state.goals, state.physics.kinematics, bearing)
-    return env.adopt(world, state, goals, state.key)
+    turned = goals.toward(env.goal_states(state), env.kinematics(state), bearing)
+    return env.adopt(world, env.task_state(state), turned, state.key)
 
 
-_TURN = jax.jit(_turn, static_argnums=0)
+_TURN = jax.jit(_turn, static_argnums=(0, 3))
 
 
-def _step(
-    env: CompositeTask, world: CompositeWorld, state: CompositeState, action: jax.Array
-) -> tuple[CompositeState, jax.Array]:
+def _step(env: Any, world: Any, state: Any, action: jax.Array) -> tuple[Any, jax.Array]:
     state, output = env.advance(world, state, action)
     return state, output.terminated
 

@@ -11,7 +11,7 @@ import jax
 
 from getup_jax import checkpoint, transfer
 from getup_jax.algo.learner import Learner, make_learner
-from getup_jax.algo.meta_chain import with_meta
+from getup_jax.algo.meta_chain import new_hinges, with_meta
 from getup_jax.algo.objectives import make_objectives
 from getup_jax.algo.state import PolicyState
 from getup_jax.checkpoint import LoadedPolicy
@@ -21,7 +21,7 @@ from getup_jax.loop import CarryOver, Job, Loop, TrainingError, num_iterations, 
 from getup_jax.metrics import MetricsWriter, tensorboard_module
 from getup_jax.nets import prior as pose_prior
 from getup_jax.progress import Display, count, duration
-from getup_jax.rehearsal import rehearse
+from getup_jax.rehearsal import Stage, rehearse
 from getup_jax.runfolder import prepare, resume_command
 from getup_jax.stop import StopRequest
 from getup_jax.storage import CheckpointError
@@ -86,14 +86,15 @@ def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Job]:
     )
     prepare = None
     if composite.rehearse:
-        prepare = functools.partial(_rehearse, learner, built, config.seed)
+        new = None if composite.meta is None else new_hinges(composite, built.environment.character)
+        prepare = functools.partial(_rehearse, learner, Stage(built, world, new), config.seed)
     return built, Job(learner=learner, world=world, prior=None, prepare=prepare)
 
 
 def _rehearse(
-    learner: Learner, built: BuiltComposite, seed: int, policy: PolicyState, log: Log
+    learner: Learner, stage: Stage, seed: int, policy: PolicyState, log: Log
 ) -> PolicyState:
-    return rehearse(learner, built, policy, jax.random.PRNGKey(seed), log)
+    return rehearse(learner, stage, policy, jax.random.PRNGKey(seed), log)
 
 
 def run(

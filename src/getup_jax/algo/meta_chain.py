@@ -14,6 +14,7 @@ from getup_jax.algo.meta import Level, LevelArrays, MetaTask, MetaWorld
 from getup_jax.algo.state import PolicyState
 from getup_jax.checkpoint import LoadedPolicy, load_policy
 from getup_jax.config import CompositeConfig, Config, ConfigError
+from getup_jax.physics.character import CharacterSpec
 from getup_jax.storage import from_nested
 from getup_jax.tasks.build_composite import (
     BuiltComposite,
@@ -21,6 +22,7 @@ from getup_jax.tasks.build_composite import (
     action_scale,
     load_clips,
 )
+from getup_jax.tasks.clip_starts import hinges_of
 from getup_jax.tasks.composite import CompositeTask
 from getup_jax.tasks.goals.combine import make_goals
 from getup_jax.tasks.groups import resolve_groups
@@ -44,6 +46,23 @@ def with_meta(config: Config, built: BuiltComposite) -> tuple[MetaTask, MetaWorl
             LevelArrays(policy, jnp.asarray(ratio, jnp.float32), jnp.asarray(shift, jnp.float32))
         )
     return MetaTask(task, tuple(levels)), MetaWorld(built.world, tuple(arrays))
+
+
+def new_hinges(composite: CompositeConfig, character: CharacterSpec) -> np.ndarray:
+    """Which hinges [A] have clips that the meta policy was not trained on."""
+    assert composite.meta is not None
+    known = _clips_of(_composite(load_policy(composite.meta).config), character)
+    wanted = _clips_of(composite, character)
+    return np.array([clips != other for clips, other in zip(wanted, known, strict=True)])
+
+
+def _clips_of(composite: CompositeConfig, character: CharacterSpec) -> list[tuple[str, ...]]:
+    """The names of the clips of every hinge's group; of two groups with one link the first is."""
+    found: list[tuple[str, ...]] = [()] * character.num_joints
+    for name, own in hinges_of(composite, character):
+        for hinge in np.flatnonzero(own):
+            found[hinge] = composite.groups[name].clips
+    return found
 
 
 def _load_chain(config: Config, task: CompositeTask) -> list[LoadedPolicy]:

@@ -104,8 +104,8 @@ class CompositeConfig:
     meta: str | None = None  # a composite policy whose actions this one weights and adds to [C 5]
     start_group: str | None = None  # episodes start along its clips; None: the last group's
     start_mixed: bool = False  # and with the other groups' hinges from their own clips
-    # before training, the actor learns by regression what comes next in the clips; only where
-    # training starts from a fresh policy
+    # before training, the actor learns by regression what comes next in the clips, over a meta
+    # policy in those that are new; only where training starts from a fresh policy
     rehearse: bool = False
     episode_s: float = 10.0
     # training episodes are cut at random, on average after this long: more samples near the clips,
@@ -127,8 +127,6 @@ class CompositeConfig:
             self._check_getup()
         else:
             require(bool(self.groups), "composite.groups", "at least one group", self.groups)
-        ok = not (self.rehearse and self.meta)
-        require(ok, "composite.rehearse", "false where composite.meta knows a motion", True)
         require(self.episode_s > 0, "composite.episode_s", "more than 0", self.episode_s)
         require(self.action_scale > 0, "composite.action_scale", "more than 0", self.action_scale)
         require(
