@@ -78,7 +78,9 @@ def _evaluation(file: Path, loaded: LoadedPolicy) -> Mapping[str, Any]:
             f"{expected}; evaluate what is exported"
         )
     if ("imitation_error_m" in result) != loaded.config.composite_motion:
-        raise ConfigError(f"--eval: {file}: is of another task than {loaded.path}")
+        raise ConfigError(
+            f"--eval: {file}: is of another task than {loaded.path}; evaluate what is exported"
+        )
     return result
 
 

@@ -6,6 +6,7 @@ import functools
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jax
 
@@ -86,15 +87,16 @@ def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Job]:
     )
     prepare = None
     if composite.rehearse:
-        new = None if composite.meta is None else new_hinges(composite, built.environment.character)
-        prepare = functools.partial(_rehearse, learner, Stage(built, world, new), config.seed)
+        prepare = functools.partial(_rehearse, learner, built, world, config.seed)
     return built, Job(learner=learner, world=world, prior=None, prepare=prepare)
 
 
 def _rehearse(
-    learner: Learner, stage: Stage, seed: int, policy: PolicyState, log: Log
+    learner: Learner, built: BuiltComposite, world: Any, seed: int, policy: PolicyState, log: Log
 ) -> PolicyState:
-    return rehearse(learner, stage, policy, jax.random.PRNGKey(seed), log)
+    task = built.environment
+    new = None if task.config.meta is None else new_hinges(task.config, task.character)
+    return rehearse(learner, Stage(built, world, new), policy, jax.random.PRNGKey(seed), log)
 
 
 def run(

@@ -31,7 +31,7 @@ class GroupConfig:
         require(ok, "composite.groups.*.history", "0 to 3, which the actor sees", self.history)
         ok = len(self.speed) == 2 and 0 < self.speed[0] <= self.speed[1]
         require(ok, "composite.groups.*.speed", "0 < slowest <= fastest", self.speed)
-        ok = bool(self.turns) and max(map(abs, self.turns), default=0.0) <= FASTEST_TURN
+        ok = bool(self.turns) and max(map(abs, self.turns)) <= FASTEST_TURN
         expected = f"rad/s from -{FASTEST_TURN} to {FASTEST_TURN}, at least one"
         require(ok, "composite.groups.*.turns", expected, self.turns)
 

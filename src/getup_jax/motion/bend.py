@@ -13,7 +13,7 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from getup_jax.motion.clips import Clip, MotionError
+from getup_jax.motion.clips import Clip, MotionError, continuous_signs
 from getup_jax.motion.loops import is_loop, repeated
 from getup_jax.motion.planting import Planter
 from getup_jax.physics.character import CharacterSpec
@@ -112,13 +112,8 @@ def _leaning(qpos: np.ndarray, place: np.ndarray, path: _Path, tangent: float) -
     qpos[:, :3] = path.bent(beneath + lean.apply(qpos[:, :3] - beneath), place)
     attitude = Rotation.from_quat(qpos[:, 3:7], scalar_first=True)
     quaternion = (path.turn(place) * lean * attitude).as_quat(scalar_first=True)
-    quaternion[1:] *= np.cumprod(_signs(quaternion))[:, None]
-    qpos[:, 3:7] = quaternion
+    qpos[:, 3:7] = quaternion * continuous_signs(quaternion)
     return qpos
-
-
-def _signs(quaternion: np.ndarray) -> np.ndarray:
-    return np.where(np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0, -1.0, 1.0)
 
 
 def _edges() -> list[str]:

@@ -36,3 +36,9 @@ class GetUp:
     clip: Clip | None = None  # the reference motion, lying first; None: curves alone
     strategy: str = ""  # class of Bohannon and Lusardi
     fit_error: np.ndarray | None = None  # [3] rms of the fit (m, rad, rad)
+
+
+def continuous_signs(quaternions: np.ndarray) -> np.ndarray:
+    """Signs [K, 1] that keep each quaternion on the side of the one before."""
+    dots = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
+    return np.cumprod(np.concatenate([[1.0], np.where(dots < 0, -1.0, 1.0)]))[:, None]

@@ -11,7 +11,7 @@ import itertools
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from getup_jax.motion.clips import Clip
+from getup_jax.motion.clips import Clip, continuous_signs
 from getup_jax.motion.keyframe_file import Keyframe, KeyframeMotion
 from getup_jax.motion.planting import Planter
 from getup_jax.physics.character import CharacterSpec
@@ -47,7 +47,7 @@ def clip_from_keyframes(
 
 def _interpolate(keys: tuple[Keyframe, ...], times: np.ndarray) -> np.ndarray:
     poses = np.stack([key.qpos for key in keys])
-    poses[:, 3:7] *= _continuous_signs(poses[:, 3:7])
+    poses[:, 3:7] *= continuous_signs(poses[:, 3:7])
     qpos = PchipInterpolator([key.time for key in keys], poses)(times)
     qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=1, keepdims=True)
     return qpos
@@ -86,12 +86,6 @@ def _fly(qpos: np.ndarray, times: np.ndarray, span: tuple[float, float], planter
     path = centres[0] + share[:, None] * (centres[-1] - centres[0])
     path[:, 2] += 0.5 * _GRAVITY * (times[inside] - times[start]) * (times[end] - times[inside])
     qpos[inside, :3] += path - centres
-
-
-def _continuous_signs(quaternions: np.ndarray) -> np.ndarray:
-    """Signs [K, 1] that keep each quaternion on the side of the one before."""
-    dots = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
-    return np.cumprod(np.concatenate([[1.0], np.where(dots < 0, -1.0, 1.0)]))[:, None]
 
 
 def _plant(
