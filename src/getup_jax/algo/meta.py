@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from getup_jax.algo import handover
 from getup_jax.algo.actor_critic import ActorCritic, normalized
 from getup_jax.algo.state import PolicyState
 from getup_jax.nets import gaussian
@@ -61,6 +62,7 @@ class MetaState:
     task: CompositeState
     observation: jax.Array  # [B, O + A]
     key: jax.Array
+    share: Any = None  # [] of the meta policy in new hinges; None: always 0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -70,6 +72,8 @@ class MetaTask:
     task: CompositeTask
     levels: tuple[Level, ...]
     sample: bool = True  # meta actions are drawn; False: their means
+    new: tuple[bool, ...] = ()  # [A] hinges that are handed over
+    first_share: float = 0.0  # of the meta policy in them; falls while training
 
     @property
     def frames(self) -> tuple[int, int]:
@@ -100,18 +104,26 @@ class MetaTask:
         """B fresh episodes."""
         key_task, key_meta, key_next = jax.random.split(key, 3)
         task = self.task.init(world.task, key_task, num_envs)
-        return MetaState(task, self._join(world, task.observation, key_meta), key_next)
+        return self._begin(task, self._join(world, task.observation, key_meta), key_next)
 
     def step(
         self, world: MetaWorld, state: MetaState, action: jax.Array
     ) -> tuple[MetaState, StepOutput]:
         """One control step; episodes that end start anew."""
-        return self._after(world, state, *self.task.step(world.task, state.task, action))
+        action = self._blended(state, action)
+        after, output = self._after(world, state, *self.task.step(world.task, state.task, action))
+        if state.share is None:
+            return after, output
+        fell, step_s = output.terminated, self.task.engine.control_dt
+        share = handover.followed(state.share, fell, step_s, self.first_share)
+        metrics = output.metrics | {"meta_share": jnp.broadcast_to(share, fell.shape)}
+        return after.replace(share=share), output.replace(metrics=metrics)
 
     def advance(
         self, world: MetaWorld, state: MetaState, action: jax.Array
     ) -> tuple[MetaState, StepOutput]:
         """One control step without resets."""
+        action = self._blended(state, action)
         return self._after(world, state, *self.task.advance(world.task, state.task, action))
 
     def kinematics(self, state: MetaState) -> Kinematics:
@@ -123,7 +135,7 @@ class MetaTask:
     ) -> MetaState:
         """See `CompositeTask.adopt`."""
         task = self.task.adopt(world.task, state, goals, key)
-        return MetaState(task, self._join(world, task.observation, key), key)
+        return self._begin(task, self._join(world, task.observation, key), key)
 
     def task_state(self, state: MetaState) -> CompositeState:
         """The episode as a task without a meta policy has it."""
@@ -137,6 +149,16 @@ class MetaTask:
         """See `CompositeTask.success`."""
         return self.task.success(state.task)
 
+    def _begin(self, task: CompositeState, observation: jax.Array, key: jax.Array) -> MetaState:
+        share = jnp.asarray(self.first_share, jnp.float32) if self.first_share else None
+        return MetaState(task, observation, key, share)
+
+    def _blended(self, state: MetaState, action: jax.Array) -> jax.Array:
+        if state.share is None:
+            return action
+        meta = state.observation[:, -self.meta_size :]
+        return handover.blended(state.share, jnp.asarray(self.new), action, meta)
+
     def _after(
         self, world: MetaWorld, state: MetaState, task: CompositeState, output: StepOutput
     ) -> tuple[MetaState, StepOutput]:
@@ -146,7 +168,7 @@ class MetaTask:
         none = jnp.zeros_like(joined[:, self.task.observation_size :])
         final = jnp.concatenate([output.final_observation, none], axis=-1)
         output = output.replace(observation=joined, final_observation=final)
-        return MetaState(task, joined, key_next), output
+        return MetaState(task, joined, key_next, state.share), output
 
     def _join(self, world: MetaWorld, observation: jax.Array, key: jax.Array) -> jax.Array:
         action = self.meta_action(world, observation, key)

@@ -45,7 +45,11 @@ def with_meta(config: Config, built: BuiltComposite) -> tuple[MetaTask, MetaWorl
         arrays.append(
             LevelArrays(policy, jnp.asarray(ratio, jnp.float32), jnp.asarray(shift, jnp.float32))
         )
-    return MetaTask(task, tuple(levels)), MetaWorld(built.world, tuple(arrays))
+    share, new = task.config.meta_share, ()
+    if share:
+        new = tuple(new_hinges(task.config, task.character).tolist())
+    env = MetaTask(task, tuple(levels), new=new, first_share=share)
+    return env, MetaWorld(built.world, tuple(arrays))
 
 
 def new_hinges(composite: CompositeConfig, character: CharacterSpec) -> np.ndarray:

@@ -69,8 +69,10 @@ def policy_in(job: Job, loaded: LoadedPolicy) -> Any:
 
 
 def without_noise(env: Any) -> Any:
-    """The environment with a meta policy, if it has one, that acts with its mean."""
-    return dataclasses.replace(env, sample=False) if isinstance(env, MetaTask) else env
+    """The environment; a meta policy, if it has one, acts with its mean, and has handed over."""
+    if not isinstance(env, MetaTask):
+        return env
+    return dataclasses.replace(env, sample=False, first_share=0.0)
 
 
 def task_of(env: Any) -> CompositeTask:

@@ -102,6 +102,9 @@ class CompositeConfig:
     multi_objective: bool = True  # False: one critic for the weighted sum of all rewards
     discriminator: DiscriminatorConfig = field(default_factory=DiscriminatorConfig)
     meta: str | None = None  # a composite policy whose actions this one weights and adds to [C 5]
+    # of the hinges with clips that the meta policy does not know: its share of their targets at
+    # first, which falls to 0 while few episodes end in falls; none in evaluations
+    meta_share: float = 0.0
     start_group: str | None = None  # episodes start along its clips; None: the last group's
     start_mixed: bool = False  # and with the other groups' hinges from their own clips
     # before training, the actor learns by regression what comes next in the clips, over a meta
@@ -128,6 +131,9 @@ class CompositeConfig:
         else:
             require(bool(self.groups), "composite.groups", "at least one group", self.groups)
         require(self.episode_s > 0, "composite.episode_s", "more than 0", self.episode_s)
+        ok = 0 <= self.meta_share < 1 and (self.meta_share == 0 or self.meta is not None)
+        expected = "at least 0, less than 1; 0 without composite.meta"
+        require(ok, "composite.meta_share", expected, self.meta_share)
         require(self.action_scale > 0, "composite.action_scale", "more than 0", self.action_scale)
         require(
             self.cut_s is None or self.cut_s > 0,
