@@ -14,7 +14,7 @@ from getup_jax.nets.prior_data import pose_conditions
 from getup_jax.physics.character import load_character
 from getup_jax.physics.native import NativeEngine
 from getup_jax.physics.surface import link_gaps
-from getup_jax.tasks import draws, region_pool
+from getup_jax.tasks import draws, early_ends, region_pool
 from getup_jax.tasks.build import assemble
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 
@@ -188,7 +188,7 @@ def test_the_head_is_on_the_floor_where_it_touches_the_slope(uneven, site):
     state = at(uneven, LYING, 3)
     link = site.character.head_sphere[0]
     kinematics = state.physics.kinematics
-    gap = np.asarray(env._head_gap(uneven.world, state))
+    gap = np.asarray(early_ends.head_gap(env.character, uneven.world.terrain, kinematics))
     qpos = np.asarray(kinematics.qpos)
     np.testing.assert_allclose(gap, link_gaps(site.character, field, qpos)[:, link], atol=1e-4)
 

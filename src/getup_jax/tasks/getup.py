@@ -13,9 +13,9 @@ from getup_jax.motion import curves
 from getup_jax.nets.prior import PosePrior
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain import Ground
-from getup_jax.rotation import angle, conjugate, multiply, rotate
+from getup_jax.rotation import angle, conjugate, multiply
 from getup_jax.rows import replace_rows
-from getup_jax.tasks import assist, curriculum, focus, practice, rewards
+from getup_jax.tasks import assist, curriculum, early_ends, focus, practice, rewards
 from getup_jax.tasks.actions import Units
 from getup_jax.tasks.draws import Draw, draw_starts
 from getup_jax.tasks.episode import (
@@ -173,12 +173,14 @@ class GetUpTask:
         terms = self._reward_terms(world, state, posture, target)
         finite = physics.kinematics.finite
         terms = {name: jnp.where(finite, value, 0.0) for name, value in terms.items()}
-        state, causes = self._early_ends(world, state, terms["task"], finite)
-        if self.config.head_grace_s > 0:
-            paid = state.head_steps <= self._steps(self.config.terminate_after_s)
-            terms["total"] = jnp.where(paid, terms["total"], 0.0)
+        control_dt = self.engine.control_dt
+        gap = early_ends.head_gap(self.character, world.terrain, physics.kinematics)
+        head = gap < self.config.head_clearance_m
+        state, causes = early_ends.counted(self.config, control_dt, state, terms["task"], head)
+        causes["not_finite"] = ~finite
+        terms["total"] = early_ends.paid(self.config, control_dt, state, terms["total"])
         terminated = causes["low_reward"] | causes["head"] | causes["not_finite"]
-        half_step = 0.5 * self.engine.control_dt
+        half_step = 0.5 * control_dt
         end = state.duration + self.config.stand_time_s - half_step
         if state.until is not None:
             end = jnp.minimum(end, state.until - half_step)
@@ -266,37 +268,6 @@ class GetUpTask:
         terms["natural"] = rewards.natural(offset, self.config.offset_limit_rad)
         terms["total"] = terms["task"] * terms["natural"]
         return terms
-
-    def _early_ends(
-        self, world: World, state: EpisodeState, task_reward: jax.Array, finite: jax.Array
-    ) -> tuple[EpisodeState, dict[str, jax.Array]]:
-        """[P 5.3]: a low task reward or the head on the floor, held for too long."""
-        low = task_reward < self.config.terminate_reward
-        head = self._head_gap(world, state) < self.config.head_clearance_m
-        state = state.replace(
-            low_steps=jnp.where(low, state.low_steps + 1, 0),
-            head_steps=jnp.where(head, state.head_steps + 1, 0),
-        )
-        config = self.config
-        causes = {
-            "low_reward": state.low_steps > self._steps(config.terminate_after_s),
-            "head": state.head_steps > self._steps(config.terminate_after_s + config.head_grace_s),
-            "not_finite": ~finite,
-        }
-        return state, causes
-
-    def _steps(self, seconds: float) -> float:
-        """Control steps in that time; as many are not yet more than it."""
-        return seconds / self.engine.control_dt + 1e-3
-
-    def _head_gap(self, world: World, state: EpisodeState) -> jax.Array:
-        """Distance [B] from the head's lowest point to the ground (m)."""
-        link, offset, radius = self.character.head_sphere
-        kinematics = state.physics.kinematics
-        centre = kinematics.link_position[:, link] + rotate(
-            kinematics.link_quaternion[:, link], jnp.asarray(offset, jnp.float32)
-        )
-        return world.terrain.clearance(centre, radius)
 
     def _record(
         self,
