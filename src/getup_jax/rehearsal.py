@@ -8,7 +8,8 @@ pose: in the states that it gets to itself when it starts on the clips (Ross et 
 reduction of imitation learning ... to no-regret online learning). Where there are clips along
 arcs, it learns to go on with the one that turns to the goal's target. Balance is left to training.
 
-Over a meta policy it learns the clips that are new, and to leave the other hinges to that policy.
+Over a meta policy it learns the clips that are new, and to leave the other hinges to that policy:
+in states with all of `composite.meta_share` first, and with less of it in every round.
 """
 
 from __future__ import annotations
@@ -67,7 +68,8 @@ def rehearse(
     before = math.nan
     for number, key_round in enumerate(jax.random.split(key, _ROUNDS)):
         key_play, key_order = jax.random.split(key_round)
-        part = _play(learner, stage, policy, targets, key_play, own=number > 0)
+        left = 1.0 - number / (_ROUNDS - 1)
+        part = _play(learner, stage, policy, targets, key_play, own=number > 0, left=left)
         parts.append(part)
         if number == 0:
             policy = observe(policy, jnp.asarray(part.observation))
@@ -103,8 +105,12 @@ def _play(
     targets: np.ndarray,
     key: jax.Array,
     own: bool,
+    left: float,
 ) -> Rehearsed:
-    """States on the way from starts on the clips, by the actor's own actions or the clips'."""
+    """States on the way from starts on the clips, by the actor's own actions or the clips'.
+
+    left: of the share that a meta policy has in the hinges with new clips.
+    """
     built, world = stage.built, stage.built.world
     env: Any = learner.env  # CompositeTask, or MetaTask around it
     std = learner.model.initial_std or learner.config.action_std[-1]
@@ -113,6 +119,8 @@ def _play(
     arc = jax.random.randint(key_arc, row.shape, 0, targets.shape[1])
     start = built.environment.start(world, row, key_start)
     state = env.adopt(stage.world, start, start.goals, key_start)
+    if stage.new is not None:
+        state = env.handed_over(state, left)
     way = (targets[row, arc] - np.asarray(world.target_centre)) / np.asarray(world.target_scale)
     goes_on = np.ones(len(row), bool)
     kept: list[Rehearsed] = []

@@ -100,9 +100,3 @@ def test_a_share_needs_a_meta_policy():
         CompositeConfig(groups=COMPOSITE.groups, meta_share=0.5)
     with pytest.raises(ConfigError, match=r"composite\.meta_share: .*less than 1"):
         CompositeConfig(groups=COMPOSITE.groups, meta="walk", meta_share=1.0)
-
-
-def test_several_groups_rehearse_from_mixed_starts():
-    """Otherwise the arms would learn to go on as the clip of the legs has them."""
-    with pytest.raises(ConfigError, match=r"composite\.start_mixed: expected true with several"):
-        CompositeConfig(groups=COMPOSITE.groups, rehearse=True)

@@ -115,7 +115,7 @@ def test_a_meta_action_reaches_the_pose_that_its_own_policy_would(trained):
 def test_a_job_has_the_meta_policy_and_the_rehearsal(trained, monkeypatch, has_meta, rehearse):
     built, _, _, path = trained
     config = _config(path) if has_meta else CONFIG
-    composite = dataclasses.replace(config.composite, rehearse=rehearse, start_mixed=rehearse)
+    composite = dataclasses.replace(config.composite, rehearse=rehearse)
     env = dataclasses.replace(built.environment, config=composite)
     made = dataclasses.replace(built, environment=env)
     monkeypatch.setattr(train, "build_composite", lambda *_: made)

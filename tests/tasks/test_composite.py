@@ -265,3 +265,18 @@ def test_mixed_starts_look_like_the_clips_of_every_group(character):
         clip = window_at(references["upper"], upper, none, time, jnp.full(len(time), 1 / 30))
         gap = jnp.abs(clip[None] - window["upper"][:, None]).max(axis=(2, 3)).min(axis=1)
         assert bool(jnp.max(gap) < 1e-5) is same
+
+
+def test_what_is_rehearsed_is_of_every_groups_clips_wherever_episodes_start(character):
+    composite = dataclasses.replace(CONFIG.composite, rehearse=True)
+    built = tiny_composite(character, dataclasses.replace(CONFIG, composite=composite))
+    knee, arm = character.joint("shin_l_flex"), character.joint("arm_r_abd")
+    own = clips(character)["upper"][0].qpos[:, 7 + arm]
+    other = clips(character)["lower"][0].qpos[:, 7 + arm]
+    assert not np.isclose(own.mean(), other.mean(), atol=0.01)  # or it would show nothing
+    # the arms start where the clip of the legs has them
+    now = np.asarray(built.world.starts.physics.kinematics.qpos)
+    assert_allclose(np.abs(now[:, 7 + arm, None] - other).min(axis=1), 0.0, atol=1e-6)
+    row, first = 3, built.following.angles[:, 0, 0]
+    assert np.abs(first[row, arm] - own).min() < 1e-3
+    assert np.abs(first[row, knee] - now[row, 7 + knee]) < 0.3

@@ -149,6 +149,10 @@ class MetaTask:
         """See `CompositeTask.success`."""
         return self.task.success(state.task)
 
+    def handed_over(self, state: MetaState, left: float) -> MetaState:
+        """The episodes with only a part `left` of the meta policy's share."""
+        return state if state.share is None else state.replace(share=left * state.share)
+
     def _begin(self, task: CompositeState, observation: jax.Array, key: jax.Array) -> MetaState:
         share = jnp.asarray(self.first_share, jnp.float32) if self.first_share else None
         return MetaState(task, observation, key, share)

@@ -131,9 +131,6 @@ class CompositeConfig:
         else:
             require(bool(self.groups), "composite.groups", "at least one group", self.groups)
         require(self.episode_s > 0, "composite.episode_s", "more than 0", self.episode_s)
-        ok = not self.rehearse or len(self.groups) == 1 or self.start_mixed
-        expected = "true with several groups and composite.rehearse, which goes on from the starts"
-        require(ok, "composite.start_mixed", expected, self.start_mixed)
         ok = 0 <= self.meta_share < 1 and (self.meta_share == 0 or self.meta is not None)
         expected = "at least 0, less than 1; 0 without composite.meta"
         require(ok, "composite.meta_share", expected, self.meta_share)

@@ -22,6 +22,7 @@ from getup_jax.tasks.clip_starts import (
     families,
     hinges_of,
     mixed,
+    repeated_as,
     resampled,
 )
 from getup_jax.tasks.composite import CompositeTask, CompositeWorld, Starts
@@ -78,9 +79,12 @@ def assemble_composite(
     turns = composite.groups[start].turns
     again = [resampled(repeated(clip, 2), 1.0 / engine.control_dt) for clip in clips[start]]
     moving: list[Family] = list(families(again, turns))
-    if composite.start_mixed:
-        moving = mixed(moving, start, composite, character, clips)
-    starts, following = clip_starts(moving, turns, character, engine, config.task.pool_size)
+    after = moving
+    if len(groups) > 1 and (composite.start_mixed or composite.rehearse):
+        after = mixed(moving, start, composite, character, clips)
+        moving = after if composite.start_mixed else repeated_as(after, moving)
+    most = config.task.pool_size
+    starts, following = clip_starts(moving, turns, character, engine, most, after)
     _check_starts(task, starts, f"composite.groups.{start}.clips")
     log(f"engine: {engine.name}; {len(starts.history)} start states along {start}'s clips")
     world = CompositeWorld(

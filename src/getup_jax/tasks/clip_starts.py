@@ -67,6 +67,12 @@ def mixed(
     return found
 
 
+def repeated_as(found: Sequence[Family], moving: Sequence[Family]) -> list[Family]:
+    """The families that those of `mixed` were made of, each as often."""
+    times = len(found) // len(moving)
+    return [family for family in moving for _ in range(times)]
+
+
 def hinges_of(
     config: CompositeConfig, character: CharacterSpec
 ) -> Iterator[tuple[str, np.ndarray]]:
@@ -81,8 +87,12 @@ def clip_starts(
     character: CharacterSpec,
     engine: Engine,
     most: int,
+    after: Sequence[Family] | None = None,
 ) -> tuple[Starts, Following]:
-    """Every frame of clips at the control rate that has enough before it; at most `most`."""
+    """Every frame of clips at the control rate that has enough before it; at most `most`.
+
+    after: the same clips, with other hinges, that follow the starts; None: those they are on.
+    """
     clips = [clip for family in moving for clip in family]
     frames = np.concatenate([clip.qpos[:-1] for clip in clips])
     physics = engine.place(frames, np.concatenate([velocities(clip, character) for clip in clips]))
@@ -97,10 +107,12 @@ def clip_starts(
     history = link_state(physics.kinematics)[before]
 
     relatives = clip[rows, None] // len(turns) * len(turns) + np.arange(len(turns))  # [P, V]
-    after = frame[rows, None, None] + np.arange(1, FOLLOWING + 1)  # [P, 1, K]
+    ahead = frame[rows, None, None] + np.arange(1, FOLLOWING + 1)  # [P, 1, K]
     length = lengths[relatives][..., None]
-    angles = frames[firsts[relatives][..., None] + np.minimum(after, length - 1), 7:]
-    angles[np.broadcast_to(after >= length, angles.shape[:-1])] = np.nan
+    if after is not None:
+        frames = np.concatenate([clip.qpos[:-1] for family in after for clip in family])
+    angles = frames[firsts[relatives][..., None] + np.minimum(ahead, length - 1), 7:]
+    angles[np.broadcast_to(ahead >= length, angles.shape[:-1])] = np.nan
     starts = Starts(physics=take(physics, jnp.asarray(rows)), history=history)
     return starts, Following(angles, np.asarray(turns, float))
 
