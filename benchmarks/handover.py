@@ -48,7 +48,7 @@ def main() -> None:
             meta = state.observation[:, -env.meta_size :]
             action = jnp.where(jnp.asarray(hinges), (target - centre) / scale, meta)
             state, output = env.advance(world, state, action)
-            upright &= ~output.terminated
+            upright &= output.metrics["ended_fall"] == 0
             return (state, upright), jnp.mean(upright)
 
         first = (state, jnp.ones(EPISODES, bool))

@@ -103,9 +103,9 @@ def test_a_meta_action_reaches_the_pose_that_its_own_policy_would(trained):
         patch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
         task, meta_world = with_meta(config, new)
     still = dataclasses.replace(task, sample=False)
-    action = jax.jit(still.meta_action)(meta_world, observation, jax.random.key(0))
+    action = jax.jit(still.meta_action)(meta_world, [observation], jax.random.key(0))
     assert_allclose(neutral + 0.5 * world.target_scale * action, own, atol=1e-4)
-    drawn = jax.jit(task.meta_action)(meta_world, observation, jax.random.key(0))
+    drawn = jax.jit(task.meta_action)(meta_world, [observation], jax.random.key(0))
     assert np.abs(np.asarray(drawn - action)).max() > 1e-3
     assert task.observation_size == env.observation_size + 28
 

@@ -17,6 +17,7 @@ from flax import struct
 
 from getup_jax.algo import handover
 from getup_jax.algo.actor_critic import ActorCritic, normalized
+from getup_jax.algo.familiar import Familiar, familiar
 from getup_jax.algo.state import PolicyState
 from getup_jax.nets import gaussian
 from getup_jax.tasks.composite import CompositeState, CompositeTask, CompositeWorld
@@ -40,6 +41,7 @@ class LevelArrays:
     policy: PolicyState
     scale: jax.Array  # [A] its action 1 in units of the next level's
     shift: jax.Array  # [A] its action 0 in them
+    sees: Familiar | None = None  # how it sees the links that it has lost; None: as they are
 
 
 @struct.dataclass
@@ -104,7 +106,7 @@ class MetaTask:
         """B fresh episodes."""
         key_task, key_meta, key_next = jax.random.split(key, 3)
         task = self.task.init(world.task, key_task, num_envs)
-        return self._begin(task, self._join(world, task.observation, key_meta), key_next)
+        return self._begin(task, self._join(world, task, key_meta), key_next)
 
     def step(
         self, world: MetaWorld, state: MetaState, action: jax.Array
@@ -114,7 +116,7 @@ class MetaTask:
         after, output = self._after(world, state, *self.task.step(world.task, state.task, action))
         if state.share is None:
             return after, output
-        fell, step_s = output.terminated, self.task.engine.control_dt
+        fell, step_s = output.metrics["ended_fall"], self.task.engine.control_dt
         share = handover.followed(state.share, fell, step_s, self.first_share)
         metrics = output.metrics | {"meta_share": jnp.broadcast_to(share, fell.shape)}
         return after.replace(share=share), output.replace(metrics=metrics)
@@ -135,7 +137,7 @@ class MetaTask:
     ) -> MetaState:
         """See `CompositeTask.adopt`."""
         task = self.task.adopt(world.task, state, goals, key)
-        return self._begin(task, self._join(world, task.observation, key), key)
+        return self._begin(task, self._join(world, task, key), key)
 
     def task_state(self, state: MetaState) -> CompositeState:
         """The episode as a task without a meta policy has it."""
@@ -167,21 +169,35 @@ class MetaTask:
         self, world: MetaWorld, state: MetaState, task: CompositeState, output: StepOutput
     ) -> tuple[MetaState, StepOutput]:
         key_next, key_meta = jax.random.split(state.key)
-        joined = self._join(world, task.observation, key_meta)
+        joined = self._join(world, task, key_meta)
         # only critics look at it, and they do not see the meta action
         none = jnp.zeros_like(joined[:, self.task.observation_size :])
         final = jnp.concatenate([output.final_observation, none], axis=-1)
         output = output.replace(observation=joined, final_observation=final)
         return MetaState(task, joined, key_next, state.share), output
 
-    def _join(self, world: MetaWorld, observation: jax.Array, key: jax.Array) -> jax.Array:
-        action = self.meta_action(world, observation, key)
-        return jnp.concatenate([observation, action], axis=-1)
+    def _join(self, world: MetaWorld, task: CompositeState, key: jax.Array) -> jax.Array:
+        action = self.meta_action(world, self._observations(world, task), key)
+        return jnp.concatenate([task.observation, action], axis=-1)
 
-    def meta_action(self, world: MetaWorld, observation: jax.Array, key: jax.Array) -> jax.Array:
-        """The chain's action [B, A] in this task's units, for observations [B, O] of the task."""
-        action = jnp.zeros((len(observation), 0), observation.dtype)
-        for index, (level, arrays) in enumerate(zip(self.levels, world.levels, strict=True)):
+    def _observations(self, world: MetaWorld, task: CompositeState) -> list[jax.Array]:
+        """What every level sees, [B, O] each; a policy's own loss hides from those before it."""
+        found, history = [], task.history
+        observation = task.observation
+        for arrays in reversed(world.levels):
+            if arrays.sees is not None:
+                history = familiar(arrays.sees, history)
+                observation = self.task.observe(history, task.goals, task.physics)
+            found.append(observation)
+        return found[::-1]
+
+    def meta_action(
+        self, world: MetaWorld, observations: list[jax.Array], key: jax.Array
+    ) -> jax.Array:
+        """The chain's action [B, A] in this task's units; an observation [B, O] a level."""
+        action = jnp.zeros((len(observations[0]), 0), observations[0].dtype)
+        levels = zip(self.levels, world.levels, observations, strict=True)
+        for index, (level, arrays, observation) in enumerate(levels):
             seen = jnp.concatenate([observation[:, jnp.asarray(level.columns)], action], axis=-1)
             seen = normalized(arrays.policy, seen)
             none = jnp.zeros(self.action_size)

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.algo.actor_critic import make_actor_critic
+from getup_jax.algo.familiar import Familiar, make_familiar
 from getup_jax.algo.meta import Level, LevelArrays, MetaTask, MetaWorld
 from getup_jax.algo.state import PolicyState
 from getup_jax.checkpoint import LoadedPolicy, load_policy
@@ -21,8 +22,8 @@ from getup_jax.tasks.build_composite import (
     action_centre,
     action_scale,
     load_clips,
+    start_states,
 )
-from getup_jax.tasks.clip_starts import hinges_of
 from getup_jax.tasks.composite import CompositeTask
 from getup_jax.tasks.goals.combine import make_goals
 from getup_jax.tasks.groups import resolve_groups
@@ -41,10 +42,10 @@ def with_meta(config: Config, built: BuiltComposite) -> tuple[MetaTask, MetaWorl
         level, policy = _level(loaded, task, has_meta=index > 0)
         (centre, scale), (next_centre, next_scale) = ends[index], ends[index + 1]
         ratio, shift = scale / next_scale, (centre - next_centre) / next_scale
+        user = chain[index + 1].config if index + 1 < len(chain) else config
+        ratio, shift = jnp.asarray(ratio, jnp.float32), jnp.asarray(shift, jnp.float32)
         levels.append(level)
-        arrays.append(
-            LevelArrays(policy, jnp.asarray(ratio, jnp.float32), jnp.asarray(shift, jnp.float32))
-        )
+        arrays.append(LevelArrays(policy, ratio, shift, _sees(loaded.config, user, task)))
     share, new = task.config.meta_share, ()
     if share:
         new = tuple(new_hinges(task.config, task.character).tolist())
@@ -52,20 +53,35 @@ def with_meta(config: Config, built: BuiltComposite) -> tuple[MetaTask, MetaWorl
     return env, MetaWorld(built.world, tuple(arrays))
 
 
+def _sees(own: Config, user: Config, task: CompositeTask) -> Familiar | None:
+    """How a policy sees the links that the one which uses it has taken from it."""
+    if _composite(user).meta_sees != "own":
+        return None
+    composite, character = _composite(own), task.character
+    clips = load_clips(composite, character)
+    starts, _ = start_states(composite, character, clips, task.engine, own.task.pool_size)
+    return make_familiar(starts.history, _differ(composite, _composite(user), character))
+
+
 def new_hinges(composite: CompositeConfig, character: CharacterSpec) -> np.ndarray:
     """Which hinges [A] have clips that the meta policy was not trained on."""
     assert composite.meta is not None
-    known = _clips_of(_composite(load_policy(composite.meta).config), character)
-    wanted = _clips_of(composite, character)
+    known = _composite(load_policy(composite.meta).config)
+    return _differ(known, composite, character)[character.joint_link]
+
+
+def _differ(one: CompositeConfig, two: CompositeConfig, character: CharacterSpec) -> np.ndarray:
+    """Which links [L] are in groups with other clips."""
+    known, wanted = _clips_of(one, character), _clips_of(two, character)
     return np.array([clips != other for clips, other in zip(wanted, known, strict=True)])
 
 
 def _clips_of(composite: CompositeConfig, character: CharacterSpec) -> list[tuple[str, ...]]:
-    """The names of the clips of every hinge's group; of two groups with one link the first is."""
-    found: list[tuple[str, ...]] = [()] * character.num_joints
-    for name, own in hinges_of(composite, character):
-        for hinge in np.flatnonzero(own):
-            found[hinge] = composite.groups[name].clips
+    """The names of the clips of every link's group; of two groups with one link the first is."""
+    found: list[tuple[str, ...]] = [()] * len(character.link_names)
+    for group in reversed(resolve_groups(composite, character)):
+        for link in group.links:
+            found[link] = composite.groups[group.name].clips
     return found
 
 

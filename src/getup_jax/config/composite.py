@@ -102,6 +102,9 @@ class CompositeConfig:
     multi_objective: bool = True  # False: one critic for the weighted sum of all rewards
     discriminator: DiscriminatorConfig = field(default_factory=DiscriminatorConfig)
     meta: str | None = None  # a composite policy whose actions this one weights and adds to [C 5]
+    # what the meta policy sees: all | own: links with clips that it does not know, as they are in
+    # its own clips where the other links look most alike
+    meta_sees: str = "all"
     # of the hinges with clips that the meta policy does not know: its share of their targets at
     # first, which falls to 0 while few episodes end in falls; none in evaluations
     meta_share: float = 0.0
@@ -131,6 +134,9 @@ class CompositeConfig:
         else:
             require(bool(self.groups), "composite.groups", "at least one group", self.groups)
         require(self.episode_s > 0, "composite.episode_s", "more than 0", self.episode_s)
+        kinds = ("all", "own")
+        ok = self.meta_sees in kinds
+        require(ok, "composite.meta_sees", f"one of {kinds}", self.meta_sees)
         ok = 0 <= self.meta_share < 1 and (self.meta_share == 0 or self.meta is not None)
         expected = "at least 0, less than 1; 0 without composite.meta"
         require(ok, "composite.meta_share", expected, self.meta_share)

@@ -29,6 +29,7 @@ from getup_jax.tasks.composite import CompositeTask, CompositeWorld, Starts
 from getup_jax.tasks.goals.combine import equipment_of, make_goals
 from getup_jax.tasks.groups import objective_weights, resolve_groups
 from getup_jax.tasks.reference_windows import make_references
+from getup_jax.types import Engine
 
 _STILL_RAD = 0.6  # scale of a hinge that the clips do not move
 _SPREADS = 4.0  # added to it: times the standard deviation of the clips' angles
@@ -75,22 +76,38 @@ def assemble_composite(
         group.name: make_references(clips[group.name], group, character, engine.control_dt)
         for group in groups
     }
-    start = composite.start_group or groups[-1].name
-    turns = composite.groups[start].turns
-    again = [resampled(repeated(clip, 2), 1.0 / engine.control_dt) for clip in clips[start]]
-    moving: list[Family] = list(families(again, turns))
-    after = moving
-    if len(groups) > 1 and (composite.start_mixed or composite.rehearse):
-        after = mixed(moving, start, composite, character, clips)
-        moving = after if composite.start_mixed else repeated_as(after, moving)
-    most = config.task.pool_size
-    starts, following = clip_starts(moving, turns, character, engine, most, after)
+    start = start_group(composite)
+    starts, following = start_states(composite, character, clips, engine, config.task.pool_size)
     _check_starts(task, starts, f"composite.groups.{start}.clips")
     log(f"engine: {engine.name}; {len(starts.history)} start states along {start}'s clips")
     world = CompositeWorld(
         starts=starts, references=references, **_targets(task, clips, config.task)
     )
     return BuiltComposite(task, world, clips, following)
+
+
+def start_group(config: CompositeConfig) -> str:
+    """The group along whose clips episodes start."""
+    return config.start_group or list(config.groups)[-1]
+
+
+def start_states(
+    config: CompositeConfig,
+    character: CharacterSpec,
+    clips: dict[str, list[Clip]],
+    engine: Engine,
+    most: int,
+) -> tuple[Starts, Following]:
+    """At most `most` states along the clips of the start group, and what follows each."""
+    start = start_group(config)
+    turns = config.groups[start].turns
+    again = [resampled(repeated(clip, 2), 1.0 / engine.control_dt) for clip in clips[start]]
+    moving: list[Family] = list(families(again, turns))
+    after = moving
+    if len(config.groups) > 1 and (config.start_mixed or config.rehearse):
+        after = mixed(moving, start, config, character, clips)
+        moving = after if config.start_mixed else repeated_as(after, moving)
+    return clip_starts(moving, turns, character, engine, most, after)
 
 
 def _targets(task: CompositeTask, clips: dict[str, list[Clip]], config: TaskConfig) -> dict:

@@ -112,7 +112,7 @@ class CompositeTask:
         goals = self.goals.reset(key, starts.physics.kinematics)
         return CompositeState(
             physics=starts.physics,
-            observation=self._observe(starts.history, goals, starts.physics),
+            observation=self.observe(starts.history, goals, starts.physics),
             history=starts.history,
             step=jnp.zeros(row.shape, jnp.int32),
             goals=goals,
@@ -153,7 +153,7 @@ class CompositeTask:
         frame = jnp.where(finite[:, None, None], link_state(physics.kinematics), 0.0)
         history = jnp.concatenate([state.history[:, 1:], frame[:, None]], axis=1)
         goals, goal_outputs = self.goals.step(key_goals, state.goals, physics.kinematics)
-        observation = self._observe(history, goals, physics)
+        observation = self.observe(history, goals, physics)
         state = state.replace(
             physics=physics,
             observation=jnp.where(finite[:, None], observation, 0.0),
@@ -222,7 +222,7 @@ class CompositeTask:
     ) -> CompositeState:
         """An episode of a task of the same character goes on in this one, with these goals."""
         none = jnp.zeros((len(state.step), len(self.goals.names)), jnp.float32)
-        observation = self._observe(state.history, goals, state.physics)
+        observation = self.observe(state.history, goals, state.physics)
         return state.replace(
             goals=goals, observation=observation, attempts=none, successes=none, key=key
         )
@@ -240,7 +240,8 @@ class CompositeTask:
         share = state.successes / jnp.where(state.attempts > 0, state.attempts, jnp.nan)
         return {f"success_{name}": share[:, i] for i, name in enumerate(self.goals.names)}
 
-    def _observe(self, history: jax.Array, goals: Any, physics: PhysicsState) -> jax.Array:
+    def observe(self, history: jax.Array, goals: Any, physics: PhysicsState) -> jax.Array:
+        """The observation [B, O] of histories [B, FRAMES + 1, L, LINK_STATE] and goals."""
         frames = observe(history[:, 1:])
         if not self.goals.names:
             return frames

@@ -15,8 +15,8 @@ from getup_jax.physics.character import CharacterSpec
 
 FEATURES = 7  # of a link in a frame: position (m) and rotation
 
-# The stems of the links in every preset; a side is added where there is one. A character has some
-# of them, and `full` is all of its links.
+# The links in every preset, with or without a side; without, both sides are in it. A character has
+# some of them, and `full` is all of its links.
 _ARMS = ("shoulder", "arm", "forearm", "hand")
 _LEGS = ("pelvis", "thigh", "shin", "foot")
 _TRUNK = ("torso", "spine_low", "spine_mid", "spine_upper", "neck", "head")
@@ -26,6 +26,8 @@ PRESETS = {
     "arms": _ARMS,
     "rest": _TRUNK + _LEGS,
     "full": _TRUNK + _ARMS + _LEGS,
+    "left_arm": tuple(f"{stem}_l" for stem in _ARMS),
+    "right_arm": tuple(f"{stem}_r" for stem in _ARMS),
 }
 
 
@@ -125,8 +127,8 @@ def _expand(names: Iterable[str], character: CharacterSpec, key: str) -> set[int
     found: set[int] = set()
     for name in names:
         if name in PRESETS:
-            stems = PRESETS[name]
-            found |= {i for i in _all(character) if _stem(known[i]) in stems}
+            part = PRESETS[name]
+            found |= {i for i in _all(character) if known[i] in part or _stem(known[i]) in part}
         elif name in known:
             found.add(known.index(name))
         else:
