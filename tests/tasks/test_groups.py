@@ -37,6 +37,9 @@ def test_presets_split_the_body(character):
         _with(arms=GroupConfig(links=("arms",)), rest=GroupConfig(links=("rest",))), character
     )
     assert len(arms.links) + len(rest.links) == len(character.link_names)
+    arm, others = (GroupConfig(links=x) for x in (("right_arm",), ("rest", "left_arm")))
+    right, _ = resolve_groups(_with(arm=arm, others=others), character)
+    assert _names(right, character) == {"arm_r", "forearm_r", "hand_r"}
     (full,) = resolve_groups(_with(full=GroupConfig(links=("full",))), character)
     assert full.links == tuple(range(len(character.link_names)))
 
