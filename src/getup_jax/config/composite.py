@@ -15,7 +15,8 @@ FASTEST_TURN = 2.0  # rad/s
 class GroupConfig:
     """Links that imitate clips of their own, judged by a discriminator of their own [C 4.1]."""
 
-    links: tuple[str, ...] = ()  # names of links, or of presets: upper, lower, arms, rest, full
+    # names of links, or of presets: upper, lower, arms, rest, full, left_arm, right_arm
+    links: tuple[str, ...] = ()
     clips: tuple[str, ...] = ()  # names of authored clips, or motion files
     frame: str = "heading"  # heading: of the newest root | root: the root's own in every frame
     history: int = 3  # n_i of equation 3; a window has 2 frames more
