@@ -37,8 +37,8 @@ def main() -> None:
     config = load_config(args.config, args.settings)
     built = build_composite(config, print)
     env, world = with_meta(config, built)
-    env = without_noise(env)
     hinges = tuple(new_hinges(env.task.config, env.task.character).tolist())
+    env = dataclasses.replace(without_noise(env), new=hinges)
     scale, centre = np.asarray(built.world.target_scale), np.asarray(built.world.target_centre)
     rate = round(1.0 / env.task.engine.control_dt)
 
@@ -63,7 +63,7 @@ def main() -> None:
     targets = jnp.asarray(clips[row][:, ahead].swapaxes(0, 1), jnp.float32)
     for share in SHARES:
         started = built.environment.start(built.world, jnp.asarray(row), jax.random.PRNGKey(0))
-        held = dataclasses.replace(env, new=hinges, first_share=share)
+        held = dataclasses.replace(env, first_share=share)
         state = held.adopt(world, started, started.goals, jax.random.PRNGKey(1))
         found = np.asarray(run(targets, state))
         print(f"{share:.2f}  " + "  ".join(f"{x:.2f}" for x in found[rate - 1 :: rate]), flush=True)
