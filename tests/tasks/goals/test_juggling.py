@@ -94,6 +94,16 @@ def test_the_third_ball_starts_towards_the_left_hand():
     np.testing.assert_allclose(there, HANDS["hand_l"], atol=1e-5)
 
 
+def test_it_goes_with_a_body_that_walks():
+    walking = kinematics(
+        position=HANDS, velocity=MOTION | {"pelvis": (1.2, -0.3, 0.1)}, balls=(UP, UP, UP)
+    )
+    still, moving = (COMMAND(GOAL.reset(KEY, x), x) for x in (seen(UP, UP, UP), walking))
+    change = moving.velocity - still.velocity
+    np.testing.assert_allclose(change[0, 2], [1.2, -0.3, 0.0], atol=1e-6)
+    np.testing.assert_allclose(change[0, :2], 0.0)
+
+
 def test_a_ball_near_the_floor_is_lost():
     low = (1.0, 0.0, 0.29)
     _, output = STEP(KEY, state(), seen(HANDS["hand_l"], HANDS["hand_r"], low))

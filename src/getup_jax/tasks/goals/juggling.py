@@ -119,14 +119,18 @@ class Juggling:
         return jnp.concatenate(blocks, axis=-1)
 
     def command(self, state: JugglingState, kinematics: Kinematics) -> PropCommand:
-        """Held balls go with their hand; a ball that leaves takes its velocity."""
+        """Held balls go with their hand; a ball that leaves takes its velocity.
+
+        The ball that is in the air at the start comes to where a body that goes on has the hand.
+        """
         hand = jnp.where(state.holder == NONE, state.leaving, state.holder)  # [B, Q]
         place = self._of_hands(kinematics.link_position)
         motion = self._of_hands(kinematics.link_linear_velocity)
         index = jnp.maximum(hand, 0)[..., None]
         position = jnp.take_along_axis(place, index, axis=1)
         velocity = jnp.take_along_axis(motion, index, axis=1)
-        thrown = throw(place[:, RIGHT], place[:, LEFT], self.first_throw_s)
+        walk = kinematics.link_linear_velocity[:, 0] * jnp.array([1.0, 1.0, 0.0])
+        thrown = throw(place[:, RIGHT], place[:, LEFT], self.first_throw_s) + walk
         start = (state.frame == 0)[:, None]
         last = jnp.where(start, thrown, velocity[:, 2])
         velocity = velocity.at[:, 2].set(last)
