@@ -25,7 +25,7 @@ def seen(*balls):
 
 def state(frame=1, holder=(LEFT, RIGHT, NONE), catcher=(RIGHT, LEFT, LEFT), leaving=(NONE,) * 3):
     rows = (jnp.asarray([values], jnp.int32) for values in (holder, catcher, leaving))
-    return JugglingState(jnp.asarray([frame], jnp.int32), *rows)
+    return JugglingState(jnp.asarray([frame], jnp.int32), *rows, fresh=jnp.zeros(1, bool))
 
 
 def test_a_ball_near_its_free_hand_is_caught():
@@ -83,15 +83,31 @@ def test_held_and_leaving_balls_move_with_their_hand():
     assert COMMAND(after, seen(UP, UP, UP)).mask[0].tolist() == [False, True, False]
 
 
-def test_the_third_ball_starts_towards_the_left_hand():
-    fresh = GOAL.reset(KEY, seen(UP, UP, UP))
-    command = COMMAND(fresh, seen(UP, UP, UP))
-    assert command.mask[0].tolist() == [True, True, True]
-    np.testing.assert_allclose(command.position[0, 2], HANDS["hand_r"], atol=1e-6)
+def test_the_third_ball_starts_towards_the_hand_that_lets_go_first():
+    """And that hand is free by then."""
     time = GOAL.first_throw_s
     fall = jnp.asarray([0.0, 0.0, -0.5 * GRAVITY * time**2])
-    there = command.position[0, 2] + command.velocity[0, 2] * time + fall
-    np.testing.assert_allclose(there, HANDS["hand_l"], atol=1e-5)
+    held = seen(HANDS["hand_l"], HANDS["hand_r"], UP)
+    firsts = set()
+    for number in range(12):
+        fresh = GOAL.reset(jax.random.key(number), held)
+        command = COMMAND(fresh, held)
+        assert command.mask[0].tolist() == [True, True, True]
+        there = command.position[0, 2] + command.velocity[0, 2] * time + fall
+        catcher = int(fresh.catcher[0, 2])
+        own, other = (HANDS[name] for name in (("hand_l", "hand_r"), ("hand_r", "hand_l"))[catcher])
+        np.testing.assert_allclose(command.position[0, 2], other, atol=1e-6)
+        np.testing.assert_allclose(there, own, atol=1e-5)
+        after, steps = fresh, 0
+        while int(after.holder[0, catcher]) == catcher:
+            assert 0 <= int(fresh.frame[0]) < GOAL.interval
+            after, _ = STEP(KEY, after, held)
+            steps += 1
+        assert 1 <= steps <= 10 < time * 30
+        assert int(after.holder[0, 1 - catcher]) == 1 - catcher
+        assert not after.fresh[0]
+        firsts.add(catcher)
+    assert firsts == {LEFT, RIGHT}
 
 
 def test_it_goes_with_a_body_that_walks():

@@ -30,10 +30,11 @@ _SHARPNESS = 3.0  # 1/m
 class JugglingState:
     """Who holds which ball. Hands: LEFT, RIGHT or NONE."""
 
-    frame: jax.Array  # [B] int32, control steps since the start
+    frame: jax.Array  # [B] int32, control steps; the left hand lets go in the middle of an interval
     holder: jax.Array  # [B, 3] int32, the hand that holds each ball; NONE: it flies
     catcher: jax.Array  # [B, 3] int32, the hand that each flying ball was thrown to
     leaving: jax.Array  # [B, 3] int32, the hand that each ball leaves right now, else NONE
+    fresh: jax.Array  # [B] bool, whether the third ball is thrown right now, to begin with
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,17 +57,23 @@ class Juggling:
     )
 
     def reset(self, key: jax.Array, kinematics: Kinematics) -> JugglingState:
-        """A ball in each hand, and one on its way from the right to the left."""
-        count = len(kinematics.finite)
+        """A ball in each hand, and one on its way to the hand that will let go first.
 
-        def everywhere(hands: tuple[int, ...]) -> jax.Array:
-            return jnp.tile(jnp.asarray(hands, jnp.int32), (count, 1))
+        Which hand, and when, is drawn: where it suits the arms' motion, the first throws succeed.
+        """
+        count = len(kinematics.finite)
+        frame = jax.random.randint(key, (count,), 0, self.interval)
+        first = jnp.where(frame < self.interval // 2, LEFT, RIGHT)
+
+        def everywhere(*hands: jax.Array | int) -> jax.Array:
+            return jnp.stack([jnp.full(count, x, jnp.int32) for x in hands], axis=1)
 
         return JugglingState(
-            frame=jnp.zeros(count, jnp.int32),
-            holder=everywhere((LEFT, RIGHT, NONE)),
-            catcher=everywhere((RIGHT, LEFT, LEFT)),
-            leaving=everywhere((NONE, NONE, RIGHT)),
+            frame=frame,
+            holder=everywhere(LEFT, RIGHT, NONE),
+            catcher=everywhere(RIGHT, LEFT, first),
+            leaving=everywhere(NONE, NONE, 1 - first),
+            fresh=jnp.ones(count, bool),
         )
 
     def step(
@@ -94,6 +101,7 @@ class Juggling:
             holder=jnp.where(release, NONE, holder),
             catcher=jnp.where(release, 1 - holder, state.catcher),
             leaving=jnp.where(release, holder, NONE),
+            fresh=jnp.zeros_like(state.fresh),
         ), output
 
     def toward(
@@ -130,9 +138,9 @@ class Juggling:
         position = jnp.take_along_axis(place, index, axis=1)
         velocity = jnp.take_along_axis(motion, index, axis=1)
         walk = kinematics.link_linear_velocity[:, 0] * jnp.array([1.0, 1.0, 0.0])
-        thrown = throw(place[:, RIGHT], place[:, LEFT], self.first_throw_s) + walk
-        start = (state.frame == 0)[:, None]
-        last = jnp.where(start, thrown, velocity[:, 2])
+        goal = jnp.take_along_axis(place, state.catcher[:, 2:, None], axis=1)[:, 0]
+        thrown = throw(position[:, 2], goal, self.first_throw_s) + walk
+        last = jnp.where(state.fresh[:, None], thrown, velocity[:, 2])
         velocity = velocity.at[:, 2].set(last)
         return PropCommand(mask=hand != NONE, position=position, velocity=velocity)
 
