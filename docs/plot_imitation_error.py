@@ -154,7 +154,8 @@ def draw(
             band = (mean - spread, mean + spread)
             axis.fill_between(steps / 1e6, *band, color=line.get_color(), alpha=0.25)
         axis.set(title=panel, xlabel="control steps (million)")
-        axis.set_ylim(0.0, None)
+        if min(mean.min() for _, mean, _ in curves.values()) >= 0:
+            axis.set_ylim(0.0, None)
         axis.grid(alpha=0.3)
     axes[0, 0].legend()
     figure.savefig(file, dpi=150)
