@@ -1,8 +1,8 @@
 """How the hinges with new clips are handed over from a meta policy to the one that is trained.
 
-Who walks has never felt still arms. A policy that moves them as their new clips say, all at once,
-falls within two seconds, and where every episode ends so soon it does not learn to stay upright.
-So the meta policy keeps a share of their targets, which falls with success.
+Where both arms do something else, a walk falls within seconds even if it does not see them
+(familiar.py): they throw it off its balance. While episodes end so soon, nobody learns to stay
+upright with them. So the meta policy keeps a share of their targets, which falls with success.
 """
 
 from __future__ import annotations
