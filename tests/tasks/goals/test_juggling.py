@@ -87,20 +87,22 @@ def test_the_third_ball_starts_towards_the_hand_that_lets_go_first():
     """And that hand is free by then."""
     time = GOAL.first_throw_s
     fall = jnp.asarray([0.0, 0.0, -0.5 * GRAVITY * time**2])
-    held = seen(HANDS["hand_l"], HANDS["hand_r"], UP)
     firsts = set()
-    for number in range(12):
-        fresh = GOAL.reset(jax.random.key(number), held)
+    for height in np.linspace(-0.3, 0.3, 7):
+        hands = {"hand_l": (0.3, 0.2, 1.0 + height), "hand_r": (0.3, -0.2, 1.0)}
+        held = kinematics(
+            position=hands, velocity=MOTION, balls=(hands["hand_l"], hands["hand_r"], UP)
+        )
+        fresh = GOAL.reset(KEY, held)
         command = COMMAND(fresh, held)
         assert command.mask[0].tolist() == [True, True, True]
         there = command.position[0, 2] + command.velocity[0, 2] * time + fall
         catcher = int(fresh.catcher[0, 2])
-        own, other = (HANDS[name] for name in (("hand_l", "hand_r"), ("hand_r", "hand_l"))[catcher])
+        own, other = (hands[name] for name in (("hand_l", "hand_r"), ("hand_r", "hand_l"))[catcher])
         np.testing.assert_allclose(command.position[0, 2], other, atol=1e-6)
         np.testing.assert_allclose(there, own, atol=1e-5)
         after, steps = fresh, 0
         while int(after.holder[0, catcher]) == catcher:
-            assert 0 <= int(fresh.frame[0]) < GOAL.interval
             after, _ = STEP(KEY, after, held)
             steps += 1
         assert 1 <= steps <= 10 < time * 30
@@ -108,6 +110,19 @@ def test_the_third_ball_starts_towards_the_hand_that_lets_go_first():
         assert not after.fresh[0]
         firsts.add(catcher)
     assert firsts == {LEFT, RIGHT}
+
+
+@pytest.mark.parametrize("step", [0, 4, 9, 10, 13, 19])
+def test_it_begins_in_time_with_hands_that_swing(step):
+    """Heights of 1 + .1 sin: the left hand rises fastest in the middle of an interval."""
+    angle = 2 * np.pi * (step - 10) / 20
+    swing, rate = 0.1 * np.sin(angle), 0.1 * 2 * np.pi / (20 / 30) * np.cos(angle)
+    now = kinematics(
+        position={"hand_l": (0.3, 0.2, 1.0 + swing), "hand_r": (0.3, -0.2, 1.0 - swing)},
+        velocity={"hand_l": (0.0, 0.0, rate), "hand_r": (0.0, 0.0, -rate)},
+        balls=(UP, UP, UP),
+    )
+    assert GOAL.reset(KEY, now).frame.tolist() == [step]
 
 
 def test_it_goes_with_a_body_that_walks():

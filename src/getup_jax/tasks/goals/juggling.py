@@ -59,10 +59,10 @@ class Juggling:
     def reset(self, key: jax.Array, kinematics: Kinematics) -> JugglingState:
         """A ball in each hand, and one on its way to the hand that will let go first.
 
-        Which hand, and when, is drawn: where it suits the arms' motion, the first throws succeed.
+        In time with the arms: hands that swing let go where they rise fastest.
         """
         count = len(kinematics.finite)
-        frame = jax.random.randint(key, (count,), 0, self.interval)
+        frame = self._in_time(kinematics)
         first = jnp.where(frame < self.interval // 2, LEFT, RIGHT)
 
         def everywhere(*hands: jax.Array | int) -> jax.Array:
@@ -161,6 +161,20 @@ class Juggling:
         beat = self.interval // 2
         hand = jnp.where((frame // beat) % 2 == 1, LEFT, RIGHT)
         return jnp.where(frame % beat == 0, hand, NONE)
+
+    def _in_time(self, kinematics: Kinematics) -> jax.Array:
+        """The control step [B] of an interval at which the hands are.
+
+        With d = left - right height as a sine of the interval's period: d = 0, rising, is the step
+        at which the left hand lets go.
+        """
+        high = self._of_hands(kinematics.link_position)[..., 2]
+        rate = self._of_hands(kinematics.link_linear_velocity)[..., 2]
+        period = self.interval * self.control_dt
+        d, d_rate = high[:, 0] - high[:, 1], rate[:, 0] - rate[:, 1]
+        turn = jnp.arctan2(2.0 * jnp.pi / period * d, d_rate) / (2.0 * jnp.pi)
+        frame = jnp.round(self.interval * (0.5 + turn)).astype(jnp.int32)
+        return jnp.mod(frame, self.interval)
 
     def _reward(self, holder: jax.Array, catcher: jax.Array, distance: jax.Array) -> jax.Array:
         """Mean over the hands [B]: 1 with a ball, exp(-3 d) at d (m) from the ball to catch."""
