@@ -48,7 +48,8 @@ def with_meta(config: Config, built: BuiltComposite) -> tuple[MetaTask, MetaWorl
         arrays.append(LevelArrays(policy, ratio, shift, _sees(loaded.config, user, task)))
     share, new = task.config.meta_share, ()
     if share:
-        new = tuple(new_hinges(task.config, task.character).tolist())
+        links = _differ(_composite(chain[-1].config), task.config, task.character)
+        new = tuple(links[task.character.joint_link].tolist())
     env = MetaTask(task, tuple(levels), new=new, first_share=share)
     return env, MetaWorld(built.world, tuple(arrays))
 
