@@ -19,7 +19,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.algo.meta_chain import new_hinges, with_meta
+from getup_jax.algo.meta_chain import with_meta
 from getup_jax.composite.episodes import without_noise
 from getup_jax.rehearsal import clip_targets
 from getup_jax.settings import load_config
@@ -37,8 +37,7 @@ def main() -> None:
     config = load_config(args.config, args.settings)
     built = build_composite(config, print)
     env, world = with_meta(config, built)
-    hinges = tuple(new_hinges(env.task.config, env.task.character).tolist())
-    env = dataclasses.replace(without_noise(env), new=hinges)
+    env = without_noise(env)
     scale, centre = np.asarray(built.world.target_scale), np.asarray(built.world.target_centre)
     rate = round(1.0 / env.task.engine.control_dt)
 
@@ -46,7 +45,7 @@ def main() -> None:
         def step(carry: Any, target: jax.Array) -> tuple[Any, jax.Array]:
             state, upright = carry
             meta = state.observation[:, -env.meta_size :]
-            action = jnp.where(jnp.asarray(hinges), (target - centre) / scale, meta)
+            action = jnp.where(jnp.asarray(env.new), (target - centre) / scale, meta)
             state, output = env.advance(world, state, action)
             upright &= output.metrics["ended_fall"] == 0
             return (state, upright), jnp.mean(upright)

@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import numpy as np
 
 from getup_jax import checkpoint, transfer
 from getup_jax.algo.learner import Learner, make_learner
-from getup_jax.algo.meta_chain import new_hinges, with_meta
+from getup_jax.algo.meta import MetaTask
+from getup_jax.algo.meta_chain import with_meta
 from getup_jax.algo.objectives import make_objectives
 from getup_jax.algo.state import PolicyState
 from getup_jax.checkpoint import LoadedPolicy
@@ -94,8 +96,8 @@ def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Job]:
 def _rehearse(
     learner: Learner, built: BuiltComposite, world: Any, seed: int, policy: PolicyState, log: Log
 ) -> PolicyState:
-    task = built.environment
-    new = None if task.config.meta is None else new_hinges(task.config, task.character)
+    env = learner.env
+    new = np.array(env.new) if isinstance(env, MetaTask) else None
     return rehearse(learner, Stage(built, world, new), policy, jax.random.PRNGKey(seed), log)
 
 

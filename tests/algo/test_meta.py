@@ -13,7 +13,7 @@ from tiny_composite import CONFIG, tiny_composite
 from getup_jax import train
 from getup_jax.algo.actor_critic import META_LOGIT, make_actor_critic, normalized, observe
 from getup_jax.algo.learner import make_learner
-from getup_jax.algo.meta_chain import new_hinges, with_meta
+from getup_jax.algo.meta_chain import with_meta
 from getup_jax.checkpoint import save_learner
 from getup_jax.config import Config, ConfigError, NetworkConfig
 from getup_jax.physics.character import load_character
@@ -125,17 +125,6 @@ def test_a_job_has_the_meta_policy_and_the_rehearsal(trained, monkeypatch, has_m
     assert (job.prepare is not None) == rehearse
     assert any(f"meta policy: {path}" in line for line in log) == has_meta
     assert (job.learner.env is env) != has_meta
-
-
-def test_hinges_are_new_where_their_clips_are(trained):
-    built, _, _, path = trained
-    groups = dict(CONFIG.composite.groups)
-    groups["upper"] = dataclasses.replace(groups["upper"], clips=("aim",))
-    composite = dataclasses.replace(_config(path).composite, groups=groups)
-    character = built.environment.character
-    new = new_hinges(composite, character)
-    assert new[character.joint("arm_r_abd")]
-    assert not new[character.joint("shin_l_flex")]
 
 
 def test_a_meta_policy_of_another_character_or_task_is_refused(trained, tmp_path):

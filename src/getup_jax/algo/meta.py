@@ -74,7 +74,7 @@ class MetaTask:
     task: CompositeTask
     levels: tuple[Level, ...]
     sample: bool = True  # meta actions are drawn; False: their means
-    new: tuple[bool, ...] = ()  # [A] hinges that are handed over
+    new: tuple[bool, ...] = ()  # [A] hinges whose clips the last meta policy was not trained on
     first_share: float = 0.0  # of the meta policy in them; falls while training
 
     @property

@@ -46,11 +46,9 @@ def with_meta(config: Config, built: BuiltComposite) -> tuple[MetaTask, MetaWorl
         ratio, shift = jnp.asarray(ratio, jnp.float32), jnp.asarray(shift, jnp.float32)
         levels.append(level)
         arrays.append(LevelArrays(policy, ratio, shift, _sees(loaded.config, user, task)))
-    share, new = task.config.meta_share, ()
-    if share:
-        links = _differ(_composite(chain[-1].config), task.config, task.character)
-        new = tuple(links[task.character.joint_link].tolist())
-    env = MetaTask(task, tuple(levels), new=new, first_share=share)
+    links = _differ(_composite(chain[-1].config), task.config, task.character)
+    new = tuple(links[task.character.joint_link].tolist())
+    env = MetaTask(task, tuple(levels), new=new, first_share=task.config.meta_share)
     return env, MetaWorld(built.world, tuple(arrays))
 
 
@@ -62,13 +60,6 @@ def _sees(own: Config, user: Config, task: CompositeTask) -> Familiar | None:
     clips = load_clips(composite, character)
     starts, _ = start_states(composite, character, clips, task.engine, own.task.pool_size)
     return make_familiar(starts.history, _differ(composite, _composite(user), character))
-
-
-def new_hinges(composite: CompositeConfig, character: CharacterSpec) -> np.ndarray:
-    """Which hinges [A] have clips that the meta policy was not trained on."""
-    assert composite.meta is not None
-    known = _composite(load_policy(composite.meta).config)
-    return _differ(known, composite, character)[character.joint_link]
 
 
 def _differ(one: CompositeConfig, two: CompositeConfig, character: CharacterSpec) -> np.ndarray:
