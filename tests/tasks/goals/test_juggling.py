@@ -34,7 +34,7 @@ def test_a_ball_near_its_free_hand_is_caught():
     after, output = STEP(KEY, free, seen((0.3, 0.2, 2.0), HANDS["hand_r"], near))
     assert after.holder[0].tolist() == [NONE, RIGHT, LEFT]
     assert output.success[0] == 1.0
-    assert output.reward[0] == pytest.approx(1.0)  # both hands hold one
+    assert output.reward[0] == pytest.approx((np.exp(-1.2) + 2.0) / 3, rel=1e-5)  # one flies
     after, output = STEP(KEY, free, seen((0.3, 0.2, 2.0), HANDS["hand_r"], UP))
     assert after.holder[0].tolist() == [NONE, RIGHT, NONE]
     assert np.isnan(output.success[0])
@@ -144,14 +144,44 @@ def test_a_ball_near_the_floor_is_lost():
     assert not output.terminated[0]
 
 
-def test_reward_by_hand():
+def in_flight(*balls, speed=((0, 0, 0),) * 3, pelvis=(0, 0, 0)):
+    """The hands, and balls with their velocities."""
+    return kinematics(position=HANDS, velocity={"pelvis": pelvis}, balls=balls, ball_velocity=speed)
+
+
+def test_a_held_ball_earns_one_and_a_flying_one_by_where_it_comes_down():
     free = state(holder=(NONE, RIGHT, NONE), catcher=(RIGHT, LEFT, LEFT))
-    _, output = STEP(KEY, free, seen((0.0, 0.0, 2.0), HANDS["hand_r"], UP))  # left: .5 m to ball 2
-    assert output.reward[0] == pytest.approx(0.5 * (1.0 + np.exp(-1.5)), rel=1e-5)
-    idle = state(holder=(NONE, NONE, NONE), catcher=(RIGHT, RIGHT, RIGHT))
-    above = (0.3, -0.2, 1.3)
-    _, output = STEP(KEY, idle, seen(above, (0, 0, 3), (0, 0, 3)))  # nothing for the left hand
-    assert output.reward[0] == pytest.approx(0.5 * np.exp(-0.9), rel=1e-5)
+    # ball 0 falls .5 m beside the right hand; ball 2 onto the left one
+    _, output = STEP(KEY, free, in_flight((0.3, -0.7, 2.0), HANDS["hand_r"], UP))
+    assert output.reward[0] == pytest.approx((np.exp(-1.5) + 1.0 + 1.0) / 3, rel=1e-5)
+
+
+def test_a_throw_is_judged_by_its_velocity():
+    """Half a second of flight at the hand's height: v T = (0, -.4), and g T / 2 up."""
+    thrown = state(holder=(NONE, RIGHT, LEFT), catcher=(RIGHT, LEFT, RIGHT))
+    up = GRAVITY / 4
+    for sideways, miss in ((-0.8, 0.0), (-0.4, 0.2)):
+        seen_now = in_flight(
+            HANDS["hand_l"], UP, UP, speed=((0, sideways, up), (0, 0, 0), (0, 0, 0))
+        )
+        _, output = STEP(KEY, thrown, seen_now)
+        assert output.reward[0] == pytest.approx((np.exp(-3 * miss) + 2.0) / 3, rel=1e-4)
+
+
+def test_a_hand_is_judged_as_if_it_walked_on_with_the_body():
+    thrown = state(holder=(NONE, RIGHT, LEFT), catcher=(RIGHT, LEFT, RIGHT))
+    speed = ((1.2, -0.8, GRAVITY / 4), (0, 0, 0), (0, 0, 0))
+    walking = in_flight(HANDS["hand_l"], UP, UP, speed=speed, pelvis=(1.2, 0.0, 0.3))
+    assert STEP(KEY, thrown, walking)[1].reward[0] == pytest.approx(1.0, rel=1e-5)
+
+
+def test_a_ball_that_stays_below_its_hand_misses_by_its_highest_point():
+    thrown = state(holder=(NONE, RIGHT, LEFT), catcher=(RIGHT, LEFT, RIGHT))
+    low = (0.3, -0.2, 0.5)
+    rises = ((0, 0, np.sqrt(2 * GRAVITY * 0.3)), (0, 0, 0), (0, 0, 0))  # to .8 m
+    for speed, miss in ((rises, 0.2), (((0, 0, -1.0), *rises[1:]), 0.5)):
+        _, output = STEP(KEY, thrown, in_flight(low, UP, UP, speed=speed))
+        assert output.reward[0] == pytest.approx((np.exp(-3 * miss) + 2.0) / 3, rel=1e-4)
 
 
 def test_observation_has_its_size_and_the_time_to_the_releases():

@@ -16,9 +16,24 @@ def throw(start: jax.Array, end: jax.Array, time: float) -> jax.Array:
 
 def landing(position: jax.Array, velocity: jax.Array) -> jax.Array:
     """Where on the floor [..., 2] (m) a ball comes down from position with velocity [..., 3]."""
-    height, up = jnp.maximum(position[..., 2], 0.0), velocity[..., 2]
-    time = (up + jnp.sqrt(jnp.square(up) + 2.0 * GRAVITY * height)) / GRAVITY
+    time = descent(position, velocity, jnp.zeros_like(position[..., 2]))
     return position[..., :2] + velocity[..., :2] * time[..., None]
+
+
+def descent(position: jax.Array, velocity: jax.Array, height: jax.Array) -> jax.Array:
+    """Time [...] (s) until a ball comes down to a height [...] (m).
+
+    Or to its highest point, where that is lower; 0 for a ball that has fallen past the height.
+    """
+    up = velocity[..., 2]
+    square = jnp.square(up) + 2.0 * GRAVITY * (position[..., 2] - height)
+    return jnp.maximum(up + jnp.sqrt(jnp.maximum(square, 0.0)), 0.0) / GRAVITY
+
+
+def flown(position: jax.Array, velocity: jax.Array, time: jax.Array) -> jax.Array:
+    """Where a ball is [..., 3] (m) after a time [...] (s) of flight."""
+    time = time[..., None]
+    return position + velocity * time + 0.5 * jnp.asarray(_DOWN) * jnp.square(time)
 
 
 def kick(before: jax.Array, after: jax.Array, time: float) -> jax.Array:

@@ -3,7 +3,7 @@
 A flying ball near the free hand that it was thrown to is caught and moves with it. Every hand
 lets go at a fixed interval, half of it after the other hand; the ball leaves with the hand's own
 velocity, so that the policy does the throwing. The reward's form is not public and our own: a
-hand earns 1 while it holds a ball, and less the farther it is from the ball that it must catch.
+ball earns 1 while it is held, and less the farther from its hand it will come down.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from flax import struct
 
 from getup_jax.physics.props import Ball
-from getup_jax.tasks.goals.flight import throw
+from getup_jax.tasks.goals.flight import descent, flown, throw
 from getup_jax.tasks.goals.goal import GoalOutput, Marker, heading_frame
 from getup_jax.types import Kinematics, PropCommand
 
@@ -91,7 +91,7 @@ class Juggling:
         holder = jnp.where(caught, state.catcher, state.holder)
         lost = jnp.any((holder == NONE) & self._low(kinematics), axis=1)
         output = GoalOutput(
-            reward=self._reward(holder, state.catcher, distance),
+            reward=self._reward(holder, state.catcher, kinematics),
             terminated=lost,
             success=jnp.where(lost, 0.0, jnp.where(jnp.any(caught, axis=1), 1.0, jnp.nan)),
         )
@@ -137,9 +137,8 @@ class Juggling:
         index = jnp.maximum(hand, 0)[..., None]
         position = jnp.take_along_axis(place, index, axis=1)
         velocity = jnp.take_along_axis(motion, index, axis=1)
-        walk = kinematics.link_linear_velocity[:, 0] * jnp.array([1.0, 1.0, 0.0])
         goal = jnp.take_along_axis(place, state.catcher[:, 2:, None], axis=1)[:, 0]
-        thrown = throw(position[:, 2], goal, self.first_throw_s) + walk
+        thrown = throw(position[:, 2], goal, self.first_throw_s) + _walk(kinematics)
         last = jnp.where(state.fresh[:, None], thrown, velocity[:, 2])
         velocity = velocity.at[:, 2].set(last)
         return PropCommand(mask=hand != NONE, position=position, velocity=velocity)
@@ -176,13 +175,19 @@ class Juggling:
         frame = jnp.round(self.interval * (0.5 + turn)).astype(jnp.int32)
         return jnp.mod(frame, self.interval)
 
-    def _reward(self, holder: jax.Array, catcher: jax.Array, distance: jax.Array) -> jax.Array:
-        """Mean over the hands [B]: 1 with a ball, exp(-3 d) at d (m) from the ball to catch."""
-        hands = jnp.arange(2)
-        holding = jnp.any(holder[..., None] == hands, axis=1)  # [B, 2]
-        aimed = (holder == NONE)[..., None] & (catcher[..., None] == hands)
-        gap = jnp.min(jnp.where(aimed, distance, jnp.inf), axis=1)
-        return jnp.mean(jnp.where(holding, 1.0, jnp.exp(-_SHARPNESS * gap)), axis=1)
+    def _reward(self, holder: jax.Array, catcher: jax.Array, kinematics: Kinematics) -> jax.Array:
+        """Mean over the balls [B]: 1 in a hand, exp(-3 d) for one that misses its hand by d (m).
+
+        d is taken when the ball comes down to the hand's height, had the hand only walked on with
+        the body: a throw is judged when the ball leaves, and a hand when it goes to meet the ball.
+        """
+        position, velocity = self._position(kinematics), self._velocity(kinematics)
+        index = catcher[..., None]
+        hand = jnp.take_along_axis(self._of_hands(kinematics.link_position), index, axis=1)
+        time = descent(position, velocity, hand[..., 2])
+        hand = hand + _walk(kinematics)[:, None] * time[..., None]
+        miss = jnp.linalg.norm(flown(position, velocity, time) - hand, axis=-1)  # [B, Q]
+        return jnp.mean(jnp.where(holder == NONE, jnp.exp(-_SHARPNESS * miss), 1.0), axis=1)
 
     def _distance(self, kinematics: Kinematics) -> jax.Array:
         """From every ball to both hands, [B, Q, 2] (m)."""
@@ -202,3 +207,8 @@ class Juggling:
     def _velocity(self, kinematics: Kinematics) -> jax.Array:
         assert kinematics.prop_velocity is not None, "the character must be loaded with the balls"
         return kinematics.prop_velocity
+
+
+def _walk(kinematics: Kinematics) -> jax.Array:
+    """Velocity of the root over the floor, [B, 3] (m/s)."""
+    return kinematics.link_linear_velocity[:, 0] * jnp.array([1.0, 1.0, 0.0])
