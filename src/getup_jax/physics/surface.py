@@ -8,6 +8,7 @@ import numpy as np
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain import HeightField
 
+TOUCH_M = 0.001  # a body at rest is about this deep in the ground
 _ALONG = 5  # spheres along a capsule
 _ACROSS = np.array([-1.0, 0.0, 1.0])  # points along a side of a box
 

@@ -16,13 +16,13 @@ from getup_jax.motion.clips import GetUp
 from getup_jax.motion.features import FeatureLinks, features
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.settle import lift_to_ground, settle
+from getup_jax.physics.surface import TOUCH_M
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 from getup_jax.tasks.paths import FoundPath, load_paths
 from getup_jax.tasks.references import Reference, make_references, velocities
 from getup_jax.types import Engine, PhysicsState
 
 _DROP_M = 0.01  # lying poses are dropped from this height
-_SINK_M = 0.001  # the others touch the ground, as a body at rest does
 _NEAR_S = 0.1  # a found state stands for the curve's times that are this close
 
 
@@ -126,7 +126,7 @@ class FlatStarts:
         free[lying] = False
         qpos = starts.qpos
         qpos[lying] = lift_to_ground(self.character, qpos[lying], _DROP_M)
-        qpos[free] = lift_to_ground(self.character, qpos[free], -_SINK_M)
+        qpos[free] = lift_to_ground(self.character, qpos[free], -TOUCH_M)
         return starts, table
 
     def _maker(self) -> _StartMaker:

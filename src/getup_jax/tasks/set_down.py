@@ -6,10 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.physics.surface import lift
+from getup_jax.physics.surface import TOUCH_M, lift
 from getup_jax.physics.terrain import HeightField
-
-_SINK_M = 0.001  # they touch the ground, as a body at rest does
 
 
 def set_down(
@@ -36,7 +34,7 @@ def set_down(
         scalar_first=True
     )
     qvel[:, :3] = turn.apply(qvel[:, :3])  # that of the root's angles is in its own frame
-    return lift(character, field, qpos, -_SINK_M), qvel
+    return lift(character, field, qpos, -TOUCH_M), qvel
 
 
 def to_normal(normal: np.ndarray, share: np.ndarray | float = 1.0) -> Rotation:

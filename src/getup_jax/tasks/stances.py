@@ -15,14 +15,13 @@ from mujoco.batch import Batch, SimulationError
 
 from getup_jax.config import ConfigError
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.physics.surface import link_gaps
+from getup_jax.physics.surface import TOUCH_M, link_gaps
 from getup_jax.physics.terrain import HeightField
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap
 from getup_jax.tasks.falls import Starts
 
 SIDES = ("l", "r")
 CONTACT_M = 0.01  # a sole touches within this gap
-_SINK_M = 0.001  # soles start this deep, as those of a body at rest are
 _ITERATIONS, _DAMPING = 12, 1e-4  # of the solver for the legs
 _CHECK_S, _MOST_DROP_M = 1.0, 0.08  # under its servos, the pelvis sinks by less in this time
 _ROUNDS = 10
@@ -136,7 +135,7 @@ def _ankle_target(
     x = np.append(forward, along)
     x /= np.linalg.norm(x)
     turn = np.stack([x, np.cross(normal, x), normal], axis=1)
-    sole = np.append(middle, level) + (bump - _SINK_M) * normal
+    sole = np.append(middle, level) + (bump - TOUCH_M) * normal
     return sole - turn @ leg.sole, turn
 
 
