@@ -4,8 +4,9 @@
 
 Lying characters under random hinge targets, the same number everywhere: on the plane, and in every
 region of the ground of configs/terrain.yaml. All are timed in turn again and again, so that a busy
-machine slows all of them alike; the median of the rounds' ratios is what counts. --drops N also
-times N rag-dolls that fall and come to rest (without the cache).
+machine slows all of them alike; the median of the rounds' ratios is what counts. With them come the
+look-ups of one control step, those of the height map and the head, as the task makes them inside
+jit. --drops N also times N rag-dolls that fall and come to rest (without the cache).
 """
 
 from __future__ import annotations
@@ -15,7 +16,10 @@ import json
 import statistics
 import time
 from pathlib import Path
+from typing import Protocol
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from mujoco.batch import Batch
 from rich.console import Console
@@ -27,10 +31,20 @@ from getup_jax.physics.settle import lift_to_ground, settle
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap, make_terrain
 from getup_jax.settings import load_config
 from getup_jax.tasks.falls import fall
+from getup_jax.tasks.observation import GRID_POINTS
 
 STEPS = 10  # control steps of one round
 TARGET_STD_RAD = 0.3
 MIN_ROUNDS = 5
+LOOK_UPS = "look-ups"
+
+
+class Timed(Protocol):
+    """What is timed."""
+
+    def round(self) -> float:
+        """Seconds of STEPS control steps."""
+        ...
 
 
 def main() -> None:
@@ -42,7 +56,7 @@ def main() -> None:
     grounds = {"plane": Ground(flat, supine(flat, args.sims), config)}
     for region, qpos in lying(uneven, ground, args.sims).items():
         grounds[region] = Ground(uneven, qpos, config)
-    seconds = measure(grounds, args.seconds)
+    seconds = measure({**grounds, LOOK_UPS: LookUps(ground, args.sims)}, args.seconds)
     result = report(seconds, args.sims)
     if args.drops:
         result["falls"] = time_falls(uneven, ground, args.drops, config.terrain)
@@ -83,6 +97,27 @@ class Ground:
         return time.perf_counter() - begin
 
 
+class LookUps:
+    """What the task asks of a height field, for characters at random places."""
+
+    def __init__(self, ground: TerrainMap, count: int):
+        rng = np.random.default_rng(0)
+        region = np.arange(count) % len(REGIONS)
+        places = np.stack([ground.draw_spawn(int(r), 1, rng)[0] for r in region])
+        near = rng.uniform(-0.5, 0.5, (count, GRID_POINTS**2, 2))
+        self._field = jax.tree.map(jnp.asarray, ground.field())
+        self._map = jnp.asarray(places[:, None] + near, jnp.float32)
+        self._head = jnp.asarray(np.pad(places, ((0, 0), (0, 1)), constant_values=1.0), jnp.float32)
+        self._look = jax.jit(lambda field, xy, head: (field.height(xy), field.clearance(head, 0.1)))
+
+    def round(self) -> float:
+        """Seconds of the look-ups of STEPS control steps."""
+        begin = time.perf_counter()
+        for _ in range(STEPS):
+            jax.block_until_ready(self._look(self._field, self._map, self._head))
+        return time.perf_counter() - begin
+
+
 def supine(character: CharacterSpec, count: int) -> np.ndarray:
     """The neutral pose on its back, settled on the plane."""
     pose = character.neutral_qpos.copy()
@@ -104,22 +139,24 @@ def lying(character: CharacterSpec, ground: TerrainMap, count: int) -> dict[str,
     return result
 
 
-def measure(grounds: dict[str, Ground], seconds: float) -> dict[str, list[float]]:
-    """Seconds of every round, the grounds in turn."""
-    for ground in grounds.values():
-        ground.round()
-    times: dict[str, list[float]] = {name: [] for name in grounds}
+def measure(parts: dict[str, Timed], seconds: float) -> dict[str, list[float]]:
+    """Seconds of every round, the parts in turn."""
+    for part in parts.values():
+        part.round()
+    times: dict[str, list[float]] = {name: [] for name in parts}
     begin = time.perf_counter()
     while time.perf_counter() - begin < seconds or len(times["plane"]) < MIN_ROUNDS:
-        for name, ground in grounds.items():
-            times[name].append(ground.round())
+        for name, part in parts.items():
+            times[name].append(part.round())
     return times
 
 
 def report(seconds: dict[str, list[float]], sims: int) -> dict:
-    plane = seconds["plane"]
+    plane, looks = seconds["plane"], seconds[LOOK_UPS]
     grounds = {}
     for name, times in seconds.items():
+        if name == LOOK_UPS:
+            continue
         ratios = [p / t for p, t in zip(plane, times, strict=True)]
         grounds[name] = {
             "control_steps_per_s": sims * STEPS / statistics.median(times),
@@ -127,7 +164,9 @@ def report(seconds: dict[str, list[float]], sims: int) -> dict:
             "of_plane_low": min(ratios),
             "of_plane_high": max(ratios),
         }
-    return {"sims": sims, "rounds": len(plane), "grounds": grounds}
+    shares = [a / b for a, b in zip(looks, seconds[REGIONS[0]], strict=True)]
+    of_step = {"median": statistics.median(shares), "low": min(shares), "high": max(shares)}
+    return {"sims": sims, "rounds": len(plane), "grounds": grounds, "look_ups_of_step": of_step}
 
 
 def time_falls(
@@ -144,6 +183,10 @@ def show(result: dict) -> None:
         spread = f"{row['of_plane_low']:.2f} - {row['of_plane_high']:.2f}"
         table.add_row(name, f"{row['control_steps_per_s']:,.0f}", f"{row['of_plane']:.2f}", spread)
     Console().print(table)
+    print(
+        "look-ups: {median:.1%} of a control step of the engine in the flat region, {low:.1%} to "
+        "{high:.1%}".format(**result["look_ups_of_step"])
+    )
     if "falls" in result:
         print("{drops:.0f} rag-dolls at rest in {seconds:.0f} s".format(**result["falls"]))
 
