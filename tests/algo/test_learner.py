@@ -225,6 +225,19 @@ def test_stages_of_rate_and_noise(run: Run):
         assert_allclose(stage.action_std, [std], rtol=1e-6)
 
 
+def test_stages_of_noise_that_the_actor_gives():
+    network = dataclasses.replace(NETWORK, initial_std=0.1)
+    ppo = dataclasses.replace(CONFIG, std_scale=(1.0, 0.4))
+    run = Run(make_learner(Probe(), network, ppo, TOTAL_STEPS))
+    state = run.initial(make_world(), jax.random.key(0))
+    for iteration, scale in ((0, 1.0), (40, 0.4)):
+        stage = run.learner.stage(dataclasses.replace(state, iteration=jnp.int32(iteration)))
+        actor, seen = state.learner.policy.actor, jnp.zeros((1, 2))
+        _, std = run.learner.model.distribution(actor, seen, stage.action_std)
+        _, own = run.learner.model.distribution(actor, seen, jnp.ones(1))
+        assert_allclose(std, scale * own, rtol=1e-6)
+
+
 def test_rate_adapts_only_when_asked(run: Run, popart_run: Run):
     world = make_world(by_action=1.0)
     fixed, _ = run.train(world, iterations=2)

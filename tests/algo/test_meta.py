@@ -36,12 +36,12 @@ def test_the_mean_is_equation_10():
     actor = model.actor.init(jax.random.key(0), jnp.zeros(2))
     seen, action = jnp.asarray([[0.3, -0.7]]), jnp.asarray([[2.0, -4.0]])
     both = jnp.concatenate([seen, action], axis=-1)
-    mean, std = model.distribution(actor, both, jnp.zeros(()))
+    mean, std = model.distribution(actor, both, jnp.full((), 0.5))
     output = np.asarray(model.actor.apply(actor, seen))
     weight = 1.0 / (1.0 + np.exp(-(output[:, 4:] + META_LOGIT)))
     assert_allclose(mean, output[:, :2] + weight * action, rtol=1e-5)
     assert_allclose(model.meta_weight(actor, both), weight, rtol=1e-5)
-    assert_allclose(std, 0.1 * np.exp(output[:, 2:4]), rtol=1e-5)
+    assert_allclose(std, 0.05 * np.exp(output[:, 2:4]), rtol=1e-5)
     # the critic does not see the meta action, and no gradient reaches it
     critic = model.critic.init(jax.random.key(1), jnp.zeros(2))
     assert_allclose(model.output(critic, both), model.output(critic, both.at[:, 2:].add(5.0)))
@@ -54,7 +54,7 @@ def test_the_std_stays_in_its_range():
     model = make_actor_critic(Probe(), network)
     actor = jax.jit(model.actor.init)(jax.random.key(0), jnp.zeros(2))
     seen = jnp.asarray([[1e4, 0.0], [-1e4, 0.0], [0.0, 0.0]])
-    _, std = model.distribution(actor, seen, jnp.zeros(()))
+    _, std = model.distribution(actor, seen, jnp.ones(()))
     low, high = 0.1 * np.exp(-0.5), 0.1 * np.exp(0.5)
     assert_allclose(np.sort(np.asarray(std)[:, 0]), [low, 0.1, high], rtol=1e-5)
 

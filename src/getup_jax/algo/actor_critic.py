@@ -66,6 +66,8 @@ class ActorCritic:
     ) -> tuple[jax.Array, jax.Array]:
         """Mean [..., A] and std of the actions; `std` [A] is the setting where it is one.
 
+        Else the actor gives the std, and `std` is what it is multiplied by.
+
         With a meta policy's action a, the mean is mu + w a (Xu et al. 2023, equation 10).
         """
         mean, log_std, weight = self._heads(actor, normalized)
@@ -74,7 +76,7 @@ class ActorCritic:
         if self.initial_std is None or log_std is None:
             return mean, std
         log_std = jnp.clip(log_std, -self.std_range, self.std_range) + math.log(self.initial_std)
-        return mean, jnp.exp(log_std)
+        return mean, std * jnp.exp(log_std)
 
     def meta_weight(self, actor: Any, normalized: jax.Array) -> jax.Array | None:
         """The weights w [..., A] of a meta policy's action, in (0, 1); None without one."""

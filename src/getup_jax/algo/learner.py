@@ -41,7 +41,7 @@ class Stage:
     """The scheduled settings of one iteration."""
 
     learning_rate: jax.Array  # [] with the adapted scale
-    action_std: jax.Array  # [A]
+    action_std: jax.Array  # [A]; where the actor gives the std, what it is multiplied by
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -129,9 +129,10 @@ class Learner:
         def scheduled(ends: tuple[float, ...]) -> jax.Array:
             return schedule.value(ends[0], ends[-1], config.stages, progress)
 
+        std = config.action_std if self.model.initial_std is None else config.std_scale
         return Stage(
             learning_rate=scheduled(config.learning_rate) * state.learner.learning_rate_scale,
-            action_std=jnp.full(self.env.action_size, scheduled(config.action_std)),
+            action_std=jnp.full(self.env.action_size, scheduled(std)),
         )
 
     def _collect(self, world: Any, state: TrainState, stage: Stage, key: jax.Array) -> Rollout:

@@ -31,7 +31,7 @@ class Level:
 
     model: ActorCritic
     columns: tuple[int, ...]  # what it sees of the observation
-    noise: bool  # its std is its own; False: it acts with its mean
+    noise: float  # times the std that it gives; 0: it acts with its mean
 
 
 @struct.dataclass
@@ -200,8 +200,8 @@ class MetaTask:
         for index, (level, arrays, observation) in enumerate(levels):
             seen = jnp.concatenate([observation[:, jnp.asarray(level.columns)], action], axis=-1)
             seen = normalized(arrays.policy, seen)
-            none = jnp.zeros(self.action_size)
-            mean, std = level.model.distribution(arrays.policy.actor, seen, none)
+            noise = jnp.full(self.action_size, level.noise)
+            mean, std = level.model.distribution(arrays.policy.actor, seen, noise)
             if self.sample and level.noise:
                 mean = gaussian.sample(jax.random.fold_in(key, index), mean, std)
             action = arrays.scale * mean + arrays.shift

@@ -127,7 +127,8 @@ def _level(loaded: LoadedPolicy, task: CompositeTask, has_meta: bool) -> tuple[L
         lambda key: model.init(key, loaded.config.ppo).policy, jax.random.PRNGKey(0)
     )
     policy = from_nested(template, loaded.policy, str(loaded.path))
-    noise = loaded.config.network.initial_std is not None
+    gives = loaded.config.network.initial_std is not None
+    noise = loaded.config.ppo.std_scale[-1] if gives else 0.0
     return Level(model, _columns(task, goals.names), noise), policy
 
 

@@ -46,7 +46,9 @@ class PPOConfig:
     learning_rate: tuple[float, ...] = (1e-4, 2e-5)  # first and last stage
     critic_rate_scale: float = 1.0  # times the learning rate, for the critic
     action_std: tuple[float, ...] = (0.6, 0.3)  # first and last stage
-    stages: int = 5  # equal stages of the whole run, for both schedules
+    # times the std that the actor gives (network.initial_std), first and last stage
+    std_scale: tuple[float, ...] = (1.0, 1.0)
+    stages: int = 5  # equal stages of the whole run, for all schedules
     target_clip_fraction: float | None = None  # adapt the learning rate to it; None: off
     critic_first: int = 0  # iterations that leave the actor alone, after `train.init_from`
     normalize_observation: bool = True
@@ -61,9 +63,11 @@ class PPOConfig:
         require(0 <= self.gae_lambda <= 1, "ppo.gae_lambda", "in [0, 1]", self.gae_lambda)
         scale = self.critic_rate_scale
         require(scale > 0, "ppo.critic_rate_scale", "more than 0", scale)
-        for name in ("learning_rate", "action_std"):
+        for name in ("learning_rate", "action_std", "std_scale"):
             ends = getattr(self, name)
             require(len(ends) == 2, f"ppo.{name}", "two values: first and last stage", ends)
+        ok = min(self.std_scale) > 0
+        require(ok, "ppo.std_scale", "two values of more than 0", self.std_scale)
 
 
 @dataclasses.dataclass(frozen=True)
