@@ -57,7 +57,9 @@ def main() -> None:
     for region, qpos in lying(uneven, ground, args.sims).items():
         grounds[region] = Ground(uneven, qpos, config)
     seconds = measure({**grounds, LOOK_UPS: LookUps(ground, args.sims)}, args.seconds)
+    looks = seconds.pop(LOOK_UPS)
     result = report(seconds, args.sims)
+    result["look_ups_of_step"] = share_of_step(looks, seconds[REGIONS[0]])
     if args.drops:
         result["falls"] = time_falls(uneven, ground, args.drops, config.terrain)
     show(result)
@@ -152,11 +154,9 @@ def measure(parts: dict[str, Timed], seconds: float) -> dict[str, list[float]]:
 
 
 def report(seconds: dict[str, list[float]], sims: int) -> dict:
-    plane, looks = seconds["plane"], seconds[LOOK_UPS]
+    plane = seconds["plane"]
     grounds = {}
     for name, times in seconds.items():
-        if name == LOOK_UPS:
-            continue
         ratios = [p / t for p, t in zip(plane, times, strict=True)]
         grounds[name] = {
             "control_steps_per_s": sims * STEPS / statistics.median(times),
@@ -164,9 +164,13 @@ def report(seconds: dict[str, list[float]], sims: int) -> dict:
             "of_plane_low": min(ratios),
             "of_plane_high": max(ratios),
         }
-    shares = [a / b for a, b in zip(looks, seconds[REGIONS[0]], strict=True)]
-    of_step = {"median": statistics.median(shares), "low": min(shares), "high": max(shares)}
-    return {"sims": sims, "rounds": len(plane), "grounds": grounds, "look_ups_of_step": of_step}
+    return {"sims": sims, "rounds": len(plane), "grounds": grounds}
+
+
+def share_of_step(looks: list[float], steps: list[float]) -> dict[str, float]:
+    """Seconds of the look-ups over those of the engine, round by round."""
+    shares = [a / b for a, b in zip(looks, steps, strict=True)]
+    return {"median": statistics.median(shares), "low": min(shares), "high": max(shares)}
 
 
 def time_falls(

@@ -127,6 +127,22 @@ def test_a_job_has_the_meta_policy_and_the_rehearsal(trained, monkeypatch, has_m
     assert (job.learner.env is env) != has_meta
 
 
+def test_hinges_are_new_where_their_clips_are(trained, monkeypatch):
+    built, _, _, path = trained
+    groups = dict(CONFIG.composite.groups)
+    groups["upper"] = dataclasses.replace(groups["upper"], clips=("aim",))
+    config = _config(path)
+    composite = dataclasses.replace(config.composite, groups=groups)
+    env = dataclasses.replace(built.environment, config=composite)
+    monkeypatch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
+    task, _ = with_meta(
+        dataclasses.replace(config, composite=composite),
+        dataclasses.replace(built, environment=env),
+    )
+    assert task.new[env.character.joint("arm_r_abd")]
+    assert not task.new[env.character.joint("shin_l_flex")]
+
+
 def test_a_meta_policy_of_another_character_or_task_is_refused(trained, tmp_path):
     built, _, policy, _ = trained
     other = dataclasses.replace(

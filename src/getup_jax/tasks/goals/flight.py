@@ -16,8 +16,8 @@ def throw(start: jax.Array, end: jax.Array, time: float) -> jax.Array:
 
 def landing(position: jax.Array, velocity: jax.Array) -> jax.Array:
     """Where on the floor [..., 2] (m) a ball comes down from position with velocity [..., 3]."""
-    time = descent(position, velocity, jnp.zeros_like(position[..., 2]))
-    return position[..., :2] + velocity[..., :2] * time[..., None]
+    floor = jnp.minimum(position[..., 2], 0.0)
+    return flown(position, velocity, descent(position, velocity, floor))[..., :2]
 
 
 def descent(position: jax.Array, velocity: jax.Array, height: jax.Array) -> jax.Array:
