@@ -298,6 +298,17 @@ def test_an_exported_policy_names_no_folder_of_this_machine(saved, tmp_path):
     assert str(tmp_path).encode() not in content
 
 
+def test_an_exported_policy_runs_on_other_machines_than_the_training_s(saved, tmp_path):
+    path = saved / "checkpoints" / "00000004"
+    loaded = load_policy(path)
+    physics = dataclasses.replace(loaded.config.physics, engine="mjx-warp")
+    config = dataclasses.replace(loaded.config, physics=physics)
+    item = {"policy": loaded.policy, "prior": loaded.prior}
+    save_learner(tmp_path / "run", 1, make_state(0), config, item)
+    exported = export_policy(tmp_path / "run", tmp_path / "flat")
+    assert load_policy(exported).config.physics.engine == "auto"
+
+
 def test_an_export_can_be_replaced_but_replaces_nothing_else(saved, tmp_path):
     export_policy(saved / "checkpoints" / "00000003", tmp_path / "flat")
     export_policy(saved, tmp_path / "flat")

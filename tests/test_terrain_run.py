@@ -16,8 +16,10 @@ from getup_jax.algo.learner import make_learner
 from getup_jax.config import NetworkConfig, PPOConfig
 from getup_jax.nets.prior import to_dict
 from getup_jax.physics.character import load_character
+from getup_jax.storage import CheckpointError, to_nested
 from getup_jax.tasks import region_pool
 from getup_jax.tasks.build import assemble
+from getup_jax.tasks.episode import with_shared
 
 PPO = PPOConfig(num_envs=8, num_steps=3, epochs=1, minibatch_size=24)
 TASK = dataclasses.replace(CONFIG.task, pool_size=96, focus=0.5)
@@ -52,6 +54,30 @@ def test_a_resumed_run_keeps_the_curriculum_and_goes_on_bit_for_bit(tmp_path, mo
     # the second region opened after four steps of the batch, the third after eight
     assert int(restored.environment.curriculum.opened) == 3
     assert float(metrics["rollout/regions_open"]) == pytest.approx((2 + 3 + 3) / 3)
+
+
+def test_another_batch_takes_over_the_curriculum_and_what_is_learned(tmp_path, monkeypatch):
+    monkeypatch.setattr(region_pool, "cache_dir", lambda: tmp_path)
+    config = dataclasses.replace(CONFIG, task=TASK, terrain=TERRAIN)
+    task, learner = build(config)
+    eight = learner.init(task.world, jax.random.PRNGKey(0)).environment
+    eight = eight.replace(
+        focus=eight.focus + 0.25, curriculum=eight.curriculum.replace(opened=jnp.asarray(3))
+    )
+    four = make_learner(
+        task.environment,
+        NetworkConfig((8,)),
+        dataclasses.replace(PPO, num_envs=4, minibatch_size=12),
+        total_steps=1000,
+    ).init(task.world, jax.random.PRNGKey(0))
+    taken = with_shared(four.environment, to_nested(eight), "run")
+    assert int(taken.curriculum.opened) == 3
+    np.testing.assert_array_equal(taken.focus, eight.focus)
+    assert taken.time.shape == (4,)
+    flat, _ = build(dataclasses.replace(config, task=dataclasses.replace(TASK, focus=0.0)))
+    other = flat.environment.start(flat.world, *jnp.zeros((3, 4), jnp.int32))
+    with pytest.raises(CheckpointError, match="run: the array focus"):
+        with_shared(other.replace(curriculum=taken.curriculum), to_nested(eight), "run")
 
 
 def test_without_a_pose_prior_the_action_is_the_servo_target():

@@ -15,7 +15,7 @@ import pytest
 from flax import struct
 
 from getup_jax import checkpoint, loop, runfolder
-from getup_jax.config import Config
+from getup_jax.config import Config, ConfigError
 from getup_jax.loop import Job, TrainingError
 from getup_jax.metrics import read_metrics
 from getup_jax.progress import Display
@@ -195,6 +195,24 @@ def test_a_run_can_start_from_the_policy_of_another(tmp_path, unbroken):
     fresh, started = (arrays(folder, 1)["state"] for folder in (unbroken, tmp_path))
     np.testing.assert_array_equal(fresh["environment"], started["environment"])
     np.testing.assert_array_equal(fresh["learner"]["count"], started["learner"]["count"])
+
+
+def test_a_run_can_go_on_with_the_learner_of_another(tmp_path, unbroken):
+    train(tmp_path, 1, f"train.init_from={unbroken}", "train.init_learner=true")
+    before, after = arrays(unbroken)["state"], arrays(tmp_path, 1)["state"]
+    assert int(after["learner"]["count"]) == int(before["learner"]["count"]) + 1
+    # counts its own iterations, with its own simulations
+    fresh = arrays(unbroken, 1)["state"]
+    assert int(after["iteration"]) == 1
+    np.testing.assert_array_equal(after["environment"], fresh["environment"])
+
+
+def test_only_a_run_has_a_learner_to_go_on_with(tmp_path, unbroken):
+    exported = checkpoint.export_policy(unbroken, tmp_path / "exported")
+    with pytest.raises(CheckpointError, match="exported: has no item 'learner'; give a checkpoint"):
+        train(tmp_path / "run", 1, f"train.init_from={exported}", "train.init_learner=true")
+    with pytest.raises(ConfigError, match=r"train\.init_learner: expected train\.init_from"):
+        train(tmp_path / "run", 1, "train.init_learner=true")
 
 
 # --- the run folder

@@ -44,6 +44,15 @@ class LoadedPolicy:
 
 
 @dataclasses.dataclass(frozen=True)
+class LoadedLearner:
+    """What `load_learner` found; nested dicts of NumPy arrays."""
+
+    learner: Any  # LearnerState by name; `from_nested` puts it into a template
+    environment: Any  # the simulations and what the task keeps of them all, by name
+    path: Path  # the item's own folder
+
+
+@dataclasses.dataclass(frozen=True)
 class Restored:
     """What `restore_learner` found."""
 
@@ -86,6 +95,17 @@ def restore_learner(folder: Path, template: Any) -> Restored:
     return Restored(state, metadata, path)
 
 
+def load_learner(path: str | Path) -> LoadedLearner:
+    """The arrays of the newest undamaged TrainState at `path`, with no need to know its shapes.
+
+    `path` is a run folder, its checkpoints folder or one checkpoint; an exported policy has none.
+    """
+    found, nested, _ = _read_newest(find_checkpoints(path), LEARNER)
+    return LoadedLearner(
+        nested["state"]["learner"], nested["state"]["environment"], found / LEARNER
+    )
+
+
 def load_policy(path: str | Path) -> LoadedPolicy:
     """The policy at `path`, with no need to know its shapes.
 
@@ -104,15 +124,17 @@ def load_policy(path: str | Path) -> LoadedPolicy:
 def export_policy(source: str | Path, destination: str | Path) -> Path:
     """Copy only the policy item of a checkpoint to a folder that `load_policy` reads.
 
-    Its config names no file that only the training's machine has: no found paths, no earlier run.
+    Its config names nothing that only the training's machine has: no found paths, no earlier run,
+    no engine.
     """
     loaded, destination = load_policy(source), Path(destination)
     if destination.exists() and not manifest.is_checkpoint(destination):
         raise CheckpointError(f"{destination}: exists and is no checkpoint; choose another folder")
     items = {POLICY: {"policy": loaded.policy, "prior": loaded.prior}}
     task = dataclasses.replace(loaded.config.task, paths=None)
-    train = dataclasses.replace(loaded.config.train, init_from=None)
-    config = dataclasses.replace(loaded.config, task=task, train=train)
+    train = dataclasses.replace(loaded.config.train, init_from=None, init_learner=False)
+    physics = dataclasses.replace(loaded.config.physics, engine="auto")
+    config = dataclasses.replace(loaded.config, physics=physics, task=task, train=train)
     _write(destination, items, config, loaded.metadata, MAX_EXPORT_BYTES)
     return destination
 

@@ -38,6 +38,8 @@ class Job:
     prior: Any  # pytree saved beside the policy, or None
     # (policy, its checkpoint, log) -> the policy as this job means it; None: as it is
     carry_over: CarryOver | None = None
+    # (environment, another's by name, its path) -> with what is not of single simulations
+    share: Callable[[Any, Any, str], Any] | None = None
     # (a fresh policy, log) -> what training begins with; None: the fresh one
     prepare: Callable[[Any, Log], Any] | None = None
 
@@ -102,9 +104,21 @@ class Loop:
         learner = self._state.learner
         policy = from_nested(learner.policy, loaded.policy, str(loaded.path))
         self._display.log(f"starting with the policy of {loaded.path}")
+        if self._config.train.init_learner:
+            self._load_learner(path)
         if self._job.carry_over is not None:
             policy = self._job.carry_over(policy, loaded, self._display.log)
         self._begin_with(policy)
+
+    def _load_learner(self, path: str) -> None:
+        loaded = checkpoint.load_learner(path)
+        state, where = self._state, str(loaded.path)
+        learner = from_nested(state.learner, loaded.learner, where)
+        environment = state.environment
+        if self._job.share is not None:
+            environment = self._job.share(environment, loaded.environment, where)
+        self._state = dataclasses.replace(state, learner=learner, environment=environment)
+        self._display.log(f"going on with the learner of {where}; the simulations begin anew")
 
     def _begin_with(self, policy: Any) -> None:
         # a copy: what the first iteration donates must be nobody else's

@@ -30,6 +30,7 @@ from getup_jax.stop import StopRequest
 from getup_jax.storage import CheckpointError
 from getup_jax.tasks.build import build_task
 from getup_jax.tasks.build_composite import BuiltComposite, build_composite
+from getup_jax.tasks.episode import with_shared
 from getup_jax.tasks.getup import World
 from getup_jax.tasks.styled import with_objectives
 
@@ -54,7 +55,7 @@ def build_job(config: Config, log: Log) -> Job:
         objectives=objectives,
     )
     carry_over = None if task.prior is None else _carry_over(learner, task.world, config.seed)
-    return Job(learner=learner, world=task.world, prior=task.prior, carry_over=carry_over)
+    return Job(learner, task.world, task.prior, carry_over, share=with_shared)
 
 
 def _carry_over(learner: Learner, world: World, seed: int) -> CarryOver:

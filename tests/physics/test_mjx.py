@@ -17,6 +17,7 @@ import pytest
 from poses import clipped, lying
 
 from getup_jax.config import ConfigError, PhysicsConfig
+from getup_jax.physics import mjx as mjx_module
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.engine import make_engine
 from getup_jax.physics.mjx import CPU_COMPILER_OPTIONS, MjxState
@@ -176,6 +177,32 @@ def test_the_callers_model_keeps_its_solver(character):
 def test_a_missing_extra_says_what_to_install(character):
     with pytest.raises(ConfigError, match=r"physics\.engine: .*pip install 'getup-jax\[warp\]'"):
         make_engine(character, PhysicsConfig(engine="mjx-warp"))
+
+
+@pytest.mark.parametrize(
+    ("backend", "installed", "engine"),
+    [("gpu", True, "warp"), ("gpu", False, "jax"), ("tpu", True, "jax")],
+)
+def test_auto_is_warp_on_a_gpu_that_has_it_else_jax(monkeypatch, backend, installed, engine):
+    made = []
+    monkeypatch.setattr(jax, "default_backend", lambda: backend)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: installed or None)
+    monkeypatch.setattr(mjx_module, "MjxEngine", lambda *_, impl: made.append(impl))
+    make_engine(None, PhysicsConfig(engine="auto"))  # type: ignore[arg-type]
+    assert made == [engine]
+
+
+@pytest.mark.slow  # warp compiles its kernels for minutes when it first sees a model
+@pytest.mark.skipif(importlib.util.find_spec("warp") is None, reason="needs the extra warp")
+def test_warp_does_what_native_does_where_nothing_touches(newton):
+    qpos, qvel, targets = starts(newton)
+    config = dataclasses.replace(CONFIG, engine="mjx-warp")
+    steps = []
+    for engine in (make_engine(newton, config), make_engine(newton, NATIVE)):
+        steps.append(play(jax.jit(engine.step), engine.place(qpos, qvel), targets[:5]))
+    warp = Runs(*steps)
+    for field, scale in FIELDS:
+        assert warp.error(field, AIRBORNE, 5) < 1e-4 * scale, field
 
 
 @pytest.mark.slow

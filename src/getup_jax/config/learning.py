@@ -80,7 +80,12 @@ class TrainConfig:
     keep: int = 2  # learner checkpoints kept
     tensorboard: bool = False  # extra: tensorboard
     init_from: str | None = None  # a checkpoint whose policy starts the run
+    # also its critic, optimiser, curriculum and which starts are learned: the same task goes on
+    # with another number of simulations or on another engine; `ppo.critic_first` is not needed
+    init_learner: bool = False
 
     def __post_init__(self) -> None:
         require(self.total_steps > 0, "train.total_steps", "more than 0", self.total_steps)
         require(self.keep >= 1, "train.keep", "at least 1", self.keep)
+        ok = self.init_from is not None or not self.init_learner
+        require(ok, "train.init_learner", "train.init_from, whose learner it means", "none")

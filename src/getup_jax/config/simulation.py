@@ -11,7 +11,7 @@ from getup_jax.config.check import require
 class PhysicsConfig:
     """The simulator: engine, rate and servo."""
 
-    engine: str = "auto"  # auto | native | mjx | mjx-warp; auto: native on a CPU, mjx elsewhere
+    engine: str = "auto"  # auto | native | mjx | mjx-warp; auto: the fastest here
     character: str = "humanoid49"  # assets/NAME.xml, or a path to an MJCF file
     control_hz: int = 30  # policy rate
     substeps: int = 2  # physics steps in one control period

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+
 import jax
 
 from getup_jax.config import PhysicsConfig
@@ -10,10 +12,8 @@ from getup_jax.types import Engine
 
 
 def make_engine(character: CharacterSpec, config: PhysicsConfig) -> Engine:
-    """The engine that the config names; auto: native on a CPU, mjx on a GPU or TPU."""
-    name = config.engine
-    if name == "auto":
-        name = "native" if jax.default_backend() == "cpu" else "mjx"
+    """The engine that the config names; auto: the fastest one here."""
+    name = _fastest() if config.engine == "auto" else config.engine
     # imported here, since either takes a second that the other does not need
     if name == "native":
         from getup_jax.physics.native import NativeEngine
@@ -22,3 +22,11 @@ def make_engine(character: CharacterSpec, config: PhysicsConfig) -> Engine:
     from getup_jax.physics.mjx import MjxEngine
 
     return MjxEngine(character, config, impl="warp" if name == "mjx-warp" else "jax")
+
+
+def _fastest() -> str:
+    """native on a CPU; mjx-warp on a GPU where it is installed, else mjx."""
+    backend = jax.default_backend()
+    if backend == "cpu":
+        return "native"
+    return "mjx-warp" if backend == "gpu" and importlib.util.find_spec("warp") else "mjx"

@@ -32,6 +32,11 @@ class MjxState:
     warmstart: jax.Array  # [B, 6 + J] last acceleration, the solver's first guess
 
 
+# Room that warp keeps for each simulation; it drops what does not fit, with a warning. Bodies that
+# lie on slopes have up to 26 contacts and 109 constraints.
+_CONTACTS = 64  # on average over all
+_CONSTRAINTS = 384  # in any one
+
 # By default XLA takes more than twice as long to compile a step for a CPU, and the result is
 # slower. These options change it by rounding alone.
 CPU_COMPILER_OPTIONS = {
@@ -54,8 +59,11 @@ class MjxEngine:
         self._scene = model
         if model.opt.solver == mujoco.mjtSolver.mjSOL_PGS:
             model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        self._impl = impl
         self._model = _put_model(model, impl)
-        self._data = mjx.make_data(model, impl=impl)
+        # MJX derives link velocities with its jax implementation alone
+        self._frames_model = self._model if impl == "jax" else mjx.put_model(model, impl="jax")
+        self._frames_data = mjx.make_data(model, impl="jax")
 
     def place(self, qpos: Any, qvel: Any) -> PhysicsState:
         """See `Engine.place`."""
@@ -75,9 +83,18 @@ class MjxEngine:
         ctrl = jnp.nan_to_num(ctrl)
         if balls is not None:
             state = state.replace(engine=self._put_balls(state.engine, balls))
-        step = jax.vmap(self._step_one, in_axes=(0, 0, None if wrench is None else 0))
+        step = functools.partial(self._step_one, self._buffers(len(ctrl)))
+        step = jax.vmap(step, in_axes=(0, 0, None if wrench is None else 0))
         engine, kinematics = step(state.engine, ctrl, wrench)
         return PhysicsState(engine=engine, kinematics=kinematics)
+
+    def _buffers(self, size: int) -> Any:
+        """Fresh data for one of `size` simulations; warp keeps the contacts of all in one list."""
+        if self._impl == "jax":
+            return self._frames_data
+        return mjx.make_data(
+            self._scene, impl=self._impl, naconmax=size * _CONTACTS, njmax=_CONSTRAINTS
+        )
 
     def _put_balls(self, state: MjxState, balls: PropCommand) -> MjxState:
         """Set the balls of the mask; they do not spin."""
@@ -95,9 +112,9 @@ class MjxEngine:
         )
 
     def _step_one(
-        self, state: MjxState, ctrl: jax.Array, wrench: jax.Array | None
+        self, data: Any, state: MjxState, ctrl: jax.Array, wrench: jax.Array | None
     ) -> tuple[MjxState, Kinematics]:
-        data = self._load(state)
+        data = _load(data, state)
         if wrench is not None:
             data = data.replace(xfrc_applied=data.xfrc_applied.at[1].set(jnp.nan_to_num(wrench)))
 
@@ -107,7 +124,7 @@ class MjxEngine:
 
         data, _ = jax.lax.scan(substep, data, None, length=self._substeps)
         after = MjxState(qpos=data.qpos, qvel=data.qvel, warmstart=data.qacc_warmstart)
-        return after, self._kinematics(data, data.actuator_force)
+        return after, self._kinematics(after, data.actuator_force)
 
     def _limit_servos(self, data: Any) -> tuple[Any, Any]:
         """Turn the servos that reach their torque limit into constant torques.
@@ -127,15 +144,12 @@ class MjxEngine:
         return model.replace(actuator_biasprm=bias), data.replace(ctrl=ctrl)
 
     def _place_one(self, state: MjxState) -> Kinematics:
-        return self._kinematics(self._load(state), jnp.zeros(self._model.nu))
+        return self._kinematics(state, jnp.zeros(self._model.nu))
 
-    def _load(self, state: MjxState) -> Any:
-        return self._data.replace(qpos=state.qpos, qvel=state.qvel, qacc_warmstart=state.warmstart)
-
-    def _kinematics(self, data: Any, torque: jax.Array) -> Kinematics:
+    def _kinematics(self, state: MjxState, torque: jax.Array) -> Kinematics:
         """Link motion at the state's own positions; `step` leaves that of one substep ago."""
-        model = self._model
-        data = mjx.kinematics(model, data)
+        model = self._frames_model
+        data = mjx.kinematics(model, _load(self._frames_data, state))
         data = mjx.com_pos(model, data)
         data = mjx.com_vel(model, data)
         links, joints = slice(1, 1 + self._sizes[0]), self._sizes[1]
@@ -156,6 +170,10 @@ class MjxEngine:
             prop_position=data.xpos[links.stop :] if len(balls) else None,
             prop_velocity=balls[:, :3] if len(balls) else None,
         )
+
+
+def _load(data: Any, state: MjxState) -> Any:
+    return data.replace(qpos=state.qpos, qvel=state.qvel, qacc_warmstart=state.warmstart)
 
 
 @functools.partial(jax.jit, static_argnums=0)

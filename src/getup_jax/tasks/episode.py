@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 from flax import struct
 
+from getup_jax.storage import from_nested
 from getup_jax.tasks.curriculum import Curriculum
 from getup_jax.types import PhysicsState
 
 # kinds of start, in the order of the pool's table
 LYING, STANDING, CLIP = 0, 1, 2
+
+SHARED = "focus", "assist", "curriculum"  # fields of EpisodeState that are of the whole batch
 
 STAND_LOWEST = 0.85  # of the curve's end, throughout the last second
 STAND_MEAN = 0.9  # of the curve's end, on average over the standing phase
@@ -63,6 +69,15 @@ class EpisodeState:
     curriculum: Curriculum | None = None  # of the whole batch
     # [B, F, L, 7] poses of the links, the oldest first; None: no discriminator looks at them
     history: jax.Array | None = None
+
+
+def with_shared(state: EpisodeState, nested: Mapping[str, Any], where: str) -> EpisodeState:
+    """The state with the `SHARED` fields of another batch, nested arrays from the file `where`.
+
+    Raises CheckpointError where the other batch had another task.
+    """
+    mine = {name: getattr(state, name) for name in SHARED}
+    return state.replace(**from_nested(mine, {name: nested.get(name) for name in SHARED}, where))
 
 
 def update_record(
