@@ -6,6 +6,9 @@ CONFIG ?= configs/flat.yaml
 ARGS   ?=
 JAX    ?=
 
+# two processes, each with whole files: what a file's tests compile they share
+PARALLEL := -n 2 --dist loadfile
+
 BIN   := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
@@ -21,7 +24,7 @@ train: $(STAMP) ## train CONFIG (configs/flat.yaml), or continue the run that is
 	$(BIN)/getup-train $(CONFIG) $(ARGS) --resume
 
 test: $(STAMP) ## the tests, on the CPU
-	JAX_PLATFORMS=cpu $(BIN)/python -m pytest -m "not slow" $(ARGS)
+	JAX_PLATFORMS=cpu $(BIN)/python -m pytest -m "not slow" $(PARALLEL) $(ARGS)
 
 test-slow: $(STAMP) ## the longer tests, on the CPU
 	JAX_PLATFORMS=cpu $(BIN)/python -m pytest -m slow $(ARGS)

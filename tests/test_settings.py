@@ -97,6 +97,10 @@ def test_numbers_that_yaml_takes_for_text_convert_in_files_too(write):
         ("ppo=3", "ppo: expected a mapping of settings, got 3 (int)"),
         ("seed.x=3", "seed: expected a whole number (int), got {'x': 3} (dict)"),
         ("ppo.minibatch_size=1000", "ppo.minibatch_size: expected a divisor"),
+        (
+            "ppo.std_scale=[1.0, 0.4]",
+            "ppo.std_scale: expected (1.0, 1.0) where network.initial_std is null",
+        ),
         ("ppo.epochs", "'ppo.epochs': expected section.key=value"),
         ("ppo.=1", "'ppo.=1': expected section.key=value"),
         ("ppo.epochs=[1", "ppo.epochs: broken YAML in '[1'"),

@@ -54,6 +54,10 @@ class Config:
         return self.composite is not None and self.composite.task == "composite"
 
     def __post_init__(self) -> None:
+        scale, default = self.ppo.std_scale, PPOConfig.std_scale
+        ok = scale == default or self.network.initial_std is not None
+        expected = f"{default} where network.initial_std is null; ppo.action_std sets the noise"
+        require(ok, "ppo.std_scale", expected, scale)
         if self.composite is None or not self.composite.groups:
             return
         flat = "null with composite motion or discriminators, which are on a plane"
