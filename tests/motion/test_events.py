@@ -7,7 +7,8 @@ import pytest
 from motion_samples import PRONE, SUPINE, getup_clip
 
 from getup_jax.motion.cache import Job, retarget_files
-from getup_jax.motion.clips import MotionError
+from getup_jax.motion.clips import GetUp, MotionError
+from getup_jax.motion.curves import NUM_POINTS
 from getup_jax.motion.events import (
     EventSettings,
     Heights,
@@ -16,7 +17,7 @@ from getup_jax.motion.events import (
     link_positions,
     orientation,
 )
-from getup_jax.motion.getups import clip_features, cut_getup, find_getups
+from getup_jax.motion.getups import clip_features, cut_getup, find_getups, flat_time
 from getup_jax.motion.readers import ReadOptions
 from getup_jax.motion.retarget import RetargetSettings
 from getup_jax.motion.strategies import OTHER, STRATEGIES
@@ -121,6 +122,12 @@ def test_a_cut_keeps_exactly_its_frames(character):
 def test_a_cut_outside_the_clip(character, start, stand):
     with pytest.raises(MotionError, match=f"rise:{start}-{stand}: expected first and last"):
         cut_getup(getup_clip(character), character, start, stand)
+
+
+def test_the_time_that_a_curve_lies_flat():
+    points = np.stack([np.linspace(0.0, 0.32, NUM_POINTS), *np.zeros((2, NUM_POINTS))], axis=1)
+    assert flat_time(GetUp("half of it", 3.0, points)) == pytest.approx(1.5, abs=0.01)
+    assert flat_time(GetUp("none of it", 3.0, points + 0.2)) == 0.0
 
 
 def test_a_board_that_stands_up_follows_no_human_strategy(character):

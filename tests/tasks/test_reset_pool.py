@@ -14,6 +14,7 @@ from getup_jax.motion.align import FEATURE_SCALE
 from getup_jax.motion.clips import GetUp
 from getup_jax.nets.prior_data import pose_conditions
 from getup_jax.paths import asset_path
+from getup_jax.tasks.build import say_which_lie
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 from getup_jax.tasks.paths import SHIPPED, FoundPath, load_path, load_paths, save_path
 from getup_jax.tasks.reset_pool import angle_gap, build_pool, kind_shares
@@ -241,3 +242,11 @@ def test_a_wider_match_accepts_it(character, engine):
     assert build_pool(
         [clip, curve], character, engine, config, seed=0, action_size=ACTION
     ).table.shape == (3, 1, 2, 10)
+
+
+def test_curves_that_lie_for_long_are_named():
+    points = np.tile([0.1, 1.57, 0.0], (curves.NUM_POINTS, 1))
+    said: list[str] = []
+    say_which_lie([GetUp("waits", 2.0, points), GetUp("rises", 0.9, points)], TASK, said.append)
+    (line,) = said
+    assert line.endswith("more than 0.3 s ends the episode; begin them later: waits (2.0 s)")

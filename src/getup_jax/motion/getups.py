@@ -24,6 +24,7 @@ from getup_jax.physics.character import CharacterSpec
 # JAX compiles once for each shape, so that frames travel in blocks of one size.
 _BLOCK = 256
 _SAMPLES = 512
+_FLAT_M = 0.16  # the neck is .11 m high on a body that lies flat, and .22 m with the head raised
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,6 +72,12 @@ def _even(values: np.ndarray) -> np.ndarray:
     """Samples [F, D] at _SAMPLES equal steps of the same duration, the ends unchanged."""
     old, new = np.linspace(0, 1, len(values)), np.linspace(0, 1, _SAMPLES)
     return np.stack([np.interp(new, old, column) for column in values.T], axis=1)
+
+
+def flat_time(getup: GetUp) -> float:
+    """Seconds for which the curve asks for a body so low that its head is on the floor."""
+    weights = np.asarray(curves.basis(jnp.linspace(0.0, 1.0, _SAMPLES)))
+    return getup.duration * float(np.mean(weights @ getup.points[:, 0] < _FLAT_M))
 
 
 def find_getups(

@@ -10,8 +10,9 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from getup_jax.config import Config, ConfigError, TerrainConfig
+from getup_jax.config import Config, ConfigError, TaskConfig, TerrainConfig
 from getup_jax.motion.clips import GetUp
+from getup_jax.motion.getups import flat_time
 from getup_jax.motion.library import load_motions
 from getup_jax.nets.prior import PosePrior
 from getup_jax.nets.prior_cache import cached_prior
@@ -25,6 +26,8 @@ from getup_jax.tasks.getup import GetUpTask, World
 from getup_jax.tasks.observation import Observer
 from getup_jax.tasks.region_pool import Site, build_region_pool
 from getup_jax.tasks.reset_pool import FlatStarts, build_pool
+
+_FLAT_S = 1.0  # a curve that lies flat for longer is mostly a matter of where it was cut
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -64,7 +67,19 @@ def build_task(
     if choose is not None:
         getups = choose(getups, character)
         log(f"motions: {len(getups)} styles made of them")
+    say_which_lie(getups, config.task, log)
     return assemble(config, character, getups, prior, log)
+
+
+def say_which_lie(getups: Sequence[GetUp], config: TaskConfig, log: Callable[[str], None]) -> None:
+    """Warn of curves that lie on the floor for longer than the head may."""
+    found = [f"{g.name} ({flat_time(g):.1f} s)" for g in getups if flat_time(g) > _FLAT_S]
+    if found:
+        log(
+            f"warning: these curves lie flat, but a head that is on the floor for more than "
+            f"{config.terminate_after_s + config.head_grace_s:.1f} s ends the episode; begin "
+            f"them later: {', '.join(found)}"
+        )
 
 
 def assemble(
