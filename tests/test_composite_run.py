@@ -128,7 +128,7 @@ def test_a_character_that_plays_the_clips_has_no_error():
         ("composite.discriminator.minibatch_size=100", r"minibatch_size: .*a divisor of .*4096"),
         ("composite.groups.upper.frame=rot", r"groups\.\*\.frame: .*'heading', 'root'"),
         ("composite.groups.upper.history=9", r"groups\.\*\.history: .*0 to 3"),
-        ("composite.weights={upper: 0.5}", r"composite\.weights: expected one of each of upper"),
+        ("composite.weights={arms: 0.5}", r"composite\.weights: expected one of each of upper"),
     ],
 )
 def test_mistakes_of_a_config(override, message):
