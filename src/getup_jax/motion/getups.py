@@ -76,8 +76,8 @@ def _even(values: np.ndarray) -> np.ndarray:
 
 def flat_time(getup: GetUp) -> float:
     """Seconds for which the curve asks for a body so low that its head is on the floor."""
-    weights = np.asarray(curves.basis(jnp.linspace(0.0, 1.0, _SAMPLES)))
-    return getup.duration * float(np.mean(weights @ getup.points[:, 0] < _FLAT_M))
+    height = curves.evaluate(jnp.asarray(getup.points), jnp.linspace(0.0, 1.0, _SAMPLES))[:, 0]
+    return getup.duration * float(jnp.mean(height < _FLAT_M))
 
 
 def find_getups(

@@ -73,10 +73,11 @@ def build_task(
 
 def say_which_lie(getups: Sequence[GetUp], config: TaskConfig, log: Callable[[str], None]) -> None:
     """Warn of curves that lie on the floor for longer than the head may."""
-    found = [f"{g.name} ({flat_time(g):.1f} s)" for g in getups if flat_time(g) > _FLAT_S]
+    lying = {getup.name: flat_time(getup) for getup in getups}
+    found = [f"{name} ({seconds:.1f} s)" for name, seconds in lying.items() if seconds > _FLAT_S]
     if found:
         log(
-            f"warning: these curves lie flat, but a head that is on the floor for more than "
+            "warning: these curves lie flat, but a head that is on the floor for more than "
             f"{config.terminate_after_s + config.head_grace_s:.1f} s ends the episode; begin "
             f"them later: {', '.join(found)}"
         )
