@@ -14,7 +14,7 @@ from getup_jax.nets.prior_data import pose_conditions
 from getup_jax.physics.character import load_character
 from getup_jax.physics.native import NativeEngine
 from getup_jax.physics.surface import link_gaps
-from getup_jax.tasks import draws, early_ends, region_pool
+from getup_jax.tasks import draws, early_ends, focus, misfit, practice, region_pool
 from getup_jax.tasks.build import assemble
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 
@@ -148,6 +148,49 @@ def test_states_made_in_chunks_are_the_same(engine, character, monkeypatch):
     monkeypatch.setattr(region_pool, "_PLACE_CHUNK", 2)
     parts = region_pool.place_in_chunks(engine, qpos, qvel)
     jax.tree.map(np.testing.assert_array_equal, whole, parts)
+
+
+def test_misfits_are_classes_of_the_first_reward(uneven):
+    """One minus the worked-out reward, in quarters; the task above has no focus and needs none."""
+    env, world = uneven.environment, uneven.world
+    assert world.pool.misfit is None
+    found = np.asarray(misfit.classes(world.pool, env.observer, world.terrain, world.points))
+    table = np.asarray(world.pool.table)
+    np.testing.assert_array_equal(found[table[LYING, 0]], 0)
+    np.testing.assert_array_equal(found[table[STANDING]], 0)
+    np.testing.assert_array_equal(found[table[CLIP, 0]], 0)
+    kinematics = world.pool.physics.kinematics
+    value = np.asarray(env.observer.posture(kinematics, world.terrain).features, np.float64)
+    for style in range(2):
+        row = table[LYING, 1:, style]
+        gap = np.abs(value[row] - np.asarray(world.points)[style, 0])
+        reward = np.exp(-1.7 * gap[..., 0] - 1.5 * (gap[..., 1] + gap[..., 2]))
+        np.testing.assert_array_equal(found[row], np.minimum(np.floor(4 * (1 - reward)), 3))
+    assert len(np.unique(found)) > 1
+
+
+def test_lying_starts_of_another_misfit_are_of_another_cell(uneven, character, cache):
+    task = dataclasses.replace(TASK, focus=0.5)
+    config = dataclasses.replace(CONFIG, task=task, terrain=TERRAIN)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(region_pool, "cache_dir", lambda: cache)
+        built = assemble(config, character, getups(character), neutral_prior(character), print)
+    pool = built.world.pool
+    regions, count = pool.table.shape[1], pool.table.shape[-1]
+    cells = np.asarray(pool.misfit)[np.asarray(pool.table[LYING, 3, 0])]
+    rows = jnp.arange(count, dtype=jnp.int32)
+    zero = jnp.zeros(count, jnp.int32)
+    state = built.environment.start(built.world, zero, zero + LYING, rows, region=zero + 3)
+    place, _, part = practice.first_cell(pool, state, built.environment.engine.control_dt)
+    np.testing.assert_array_equal(part, cells)
+    np.testing.assert_array_equal(place, LYING * regions + 3)
+    # the class of the first row is solved, the others are not: they are drawn instead
+    learned = focus.first(pool).at[LYING * regions + 3, 0, cells[0]].set(1.0)
+    learned = learned.at[CLIP * regions].set(1.0)
+    weight = np.asarray(focus.weights(learned, pool, built.world.duration, 0.5))
+    expected = np.where(cells == cells[0], 0.5, 1.0)
+    np.testing.assert_allclose(weight[LYING * regions + 3, 0], expected, atol=1e-6)
+    assert len(np.unique(cells)) > 1
 
 
 # The task on irregular ground.

@@ -22,6 +22,7 @@ from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.engine import make_engine
 from getup_jax.physics.terrain import Ground, Terrain
 from getup_jax.physics.terrain_map import make_terrain
+from getup_jax.tasks import misfit
 from getup_jax.tasks.getup import GetUpTask, World
 from getup_jax.tasks.observation import Observer
 from getup_jax.tasks.region_pool import Site, build_region_pool
@@ -117,13 +118,16 @@ def assemble(
         terrain = jax.tree.map(jnp.asarray, site.ground.field())
         flat = FlatStarts(getups, character, config.task, config.seed, action_size)
         pool = build_region_pool(getups, flat, site, engine, config.task, log)
+    points = jnp.asarray(np.stack([g.points for g in getups]), jnp.float32)
+    if site is not None and config.task.focus > 0:
+        pool = pool.replace(misfit=misfit.classes(pool, task.observer, terrain, points))
     log(f"start states: {len(pool.time)}")
     margin = config.task.target_margin_rad
     world = World(
         prior=prior,
         pool=pool,
         terrain=terrain,
-        points=jnp.asarray(np.stack([g.points for g in getups]), jnp.float32),
+        points=points,
         duration=jnp.asarray([g.duration for g in getups], jnp.float32),
         neutral_rotation=_neutral_rotation(character, task.observer),
         target_lower=jnp.asarray(character.joint_lower - margin, jnp.float32),

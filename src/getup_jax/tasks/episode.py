@@ -66,6 +66,7 @@ class EpisodeState:
     assist: jax.Array | None = None
     # Irregular ground only; None on a flat plane.
     region: jax.Array | None = None  # [B] int32, where the episode started
+    misfit: jax.Array | None = None  # [B] int32, of the start; see misfit.py
     curriculum: Curriculum | None = None  # of the whole batch
     # [B, F, L, 7] poses of the links, the oldest first; None: no discriminator looks at them
     history: jax.Array | None = None

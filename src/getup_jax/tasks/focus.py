@@ -1,10 +1,11 @@
 """Starts at the frontier of what the policy can do are drawn more often than the others.
 
 Success is followed in cells: place x style x part of the curve at which it starts, where a place is
-a kind of start in a region (the kind alone on a flat plane). At the frontier a start sometimes
-succeeds, or it fails and the next part of the curve is solved (reverse curriculum, Florensa et al.
-2017). A solved episode is several times as long as one that fails, so that with even draws most
-samples would come from what needs no more practice.
+a kind of start in a region (the kind alone on a flat plane). Lying starts are all in the first
+part, and have the class of `misfit.py` in its stead. At the frontier a start sometimes succeeds, or
+it fails and the next part of the curve is solved (reverse curriculum, Florensa et al. 2017). A
+solved episode is several times as long as one that fails, so that with even draws most samples
+would come from what needs no more practice.
 """
 
 from __future__ import annotations
@@ -35,6 +36,11 @@ def bin_of(begin: jax.Array) -> jax.Array:
     return jnp.clip(jnp.floor(begin * BINS + 1e-3), 0, BINS - 1).astype(jnp.int32)
 
 
+def part_of(begin: jax.Array, misfit: jax.Array | None) -> jax.Array:
+    """Last index [...] int32 of the cells of starts: lying ones, at 0, have their misfit there."""
+    return bin_of(begin) if misfit is None else bin_of(begin) + misfit
+
+
 def weights(
     learned: jax.Array,
     pool: Pool,
@@ -51,7 +57,8 @@ def weights(
     curve.
     """
     table = pool.table.reshape(-1, *pool.table.shape[2:])
-    part = bin_of(pool.time[table] / duration[:, None])
+    misfit = None if pool.misfit is None else pool.misfit[table]
+    part = part_of(pool.time[table] / duration[:, None], misfit)
     places, styles, _ = part.shape
     cell = (jnp.arange(places)[:, None, None], jnp.arange(styles)[None, :, None], part)
     used = jnp.zeros(learned.shape, bool).at[cell].set(True)

@@ -144,6 +144,7 @@ class GetUpTask:
             record=Record.empty(size),
             key=jnp.zeros(2, jnp.uint32),
             region=self._region_of(region, getup),
+            misfit=None if world.pool.misfit is None else world.pool.misfit[index],
         )
         # The filter keeps most of the last action, so the first target must be the start pose.
         angles = physics.kinematics.qpos[:, 7:]

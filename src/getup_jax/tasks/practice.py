@@ -17,7 +17,7 @@ def first_cell(pool: Pool, state: EpisodeState, control_dt: float) -> tuple[jax.
     steps = state.record.rise_steps + state.record.stand_steps
     begin = (state.time - steps * control_dt) / state.duration
     place = focus.place_of(pool, state.kind, state.region)
-    return place, state.getup, focus.bin_of(begin)
+    return place, state.getup, focus.part_of(begin, state.misfit)
 
 
 def runs_to_the_end(state: EpisodeState) -> jax.Array:

@@ -62,6 +62,7 @@ class Pool:
     table: jax.Array  # [3, R, G, M] int32 rows of every kind of start, region and style
     action: jax.Array | None = None  # [P, A] filtered, NaN: the pose's own; None: all are
     startable: Startable | None = None  # None, a flat plane: every style can start everywhere
+    misfit: jax.Array | None = None  # [P] int32, see misfit.py; None: nobody asks
 
 
 def build_pool(
