@@ -27,13 +27,17 @@ def cache(tmp_path_factory):
     return tmp_path_factory.mktemp("starts")
 
 
-@pytest.fixture(scope="module")
-def uneven(character, cache):
+def uneven_task(character, cache, task=TASK):
     """A get-up task on the small irregular ground."""
-    config = dataclasses.replace(CONFIG, task=TASK, terrain=TERRAIN)
+    config = dataclasses.replace(CONFIG, task=task, terrain=TERRAIN)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(region_pool, "cache_dir", lambda: cache)
         return assemble(config, character, getups(character), neutral_prior(character), print)
+
+
+@pytest.fixture(scope="module")
+def uneven(character, cache):
+    return uneven_task(character, cache)
 
 
 def rows(task, kind: int, region: int, style: int) -> np.ndarray:
@@ -75,10 +79,7 @@ def test_times_are_those_of_the_kind(uneven):
 
 def test_every_region_has_starts_along_the_clip_if_asked(character, site, cache):
     task = dataclasses.replace(TASK, clip_everywhere=True)
-    config = dataclasses.replace(CONFIG, task=task, terrain=TERRAIN)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(region_pool, "cache_dir", lambda: cache)
-        built = assemble(config, character, getups(character), neutral_prior(character), print)
+    built = uneven_task(character, cache, task)
     pool = built.world.pool
     time = np.asarray(pool.time)[np.asarray(pool.table)]
     np.testing.assert_array_equal(time[CLIP, 1:], np.repeat(time[CLIP, :1], 3, axis=0))
@@ -169,12 +170,8 @@ def test_misfits_are_classes_of_the_first_reward(uneven):
     assert len(np.unique(found)) > 1
 
 
-def test_lying_starts_of_another_misfit_are_of_another_cell(uneven, character, cache):
-    task = dataclasses.replace(TASK, focus=0.5)
-    config = dataclasses.replace(CONFIG, task=task, terrain=TERRAIN)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(region_pool, "cache_dir", lambda: cache)
-        built = assemble(config, character, getups(character), neutral_prior(character), print)
+def test_lying_starts_of_another_misfit_are_of_another_cell(character, cache):
+    built = uneven_task(character, cache, dataclasses.replace(TASK, focus=0.5))
     pool = built.world.pool
     regions, count = pool.table.shape[1], pool.table.shape[-1]
     cells = np.asarray(pool.misfit)[np.asarray(pool.table[LYING, 3, 0])]
