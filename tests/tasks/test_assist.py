@@ -36,12 +36,19 @@ def at(character, rotation: Rotation, spin=(0.0, 0.0, 0.0)) -> tuple[Kinematics,
     return kinematics, features(FeatureLinks.of(character), position, 0.0)
 
 
-def hand(character, rotation, change, spin=(0.0, 0.0, 0.0)) -> np.ndarray:
-    """The wrench [6] where the target is the pose's features plus change [3]."""
+def hand(
+    character, rotation, change, spin=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0), height=None
+) -> np.ndarray:
+    """The wrench [6] where the target is the pose's features plus change [3].
+
+    normal: of the ground; height: of the neck, None: that of the pose.
+    """
     kinematics, value = at(character, rotation, spin)
+    value = value if height is None else value.at[:, 0].set(height)
     target = value + jnp.asarray(change)
-    links = FeatureLinks.of(character)
-    return np.asarray(assist.wrench(links, kinematics, value, target, jnp.asarray([MOST])))[0]
+    links, ground = FeatureLinks.of(character), jnp.asarray([normal])
+    most = jnp.asarray([MOST])
+    return np.asarray(assist.wrench(links, kinematics, value, target, ground, most))[0]
 
 
 def test_it_lifts_below_the_curve_and_never_pushes_down(character):
@@ -71,6 +78,38 @@ def test_its_torque_is_limited_and_brakes(character):
     # .05 rad of error for 1 rad/s, where .5 rad are worth .25 m times the most lift
     brake = hand(character, Rotation.identity(), [0.0, 0.0, 0.0], spin=(0.0, 0.0, 2.0))[3:]
     np.testing.assert_allclose(brake, [0.0, 0.0, -0.25 * MOST * 0.05 * 2.0 / 0.5], rtol=1e-5)
+
+
+SUPINE = Rotation.from_euler("y", -90, degrees=True)  # the head at -x
+PRONE = Rotation.from_euler("y", 90, degrees=True)  # the head at +x
+SITTING = Rotation.from_euler("y", -20, degrees=True)  # the legs at +x
+SLOPE = np.array([np.sin(0.5), 0.0, np.cos(0.5)])  # down towards +x
+
+
+def turn(character, pose: Rotation, heading_deg: float, height: float = 0.2) -> float:
+    """Torque about z (Nm) on a body that was turned from the pose by the angle about z."""
+    body = Rotation.from_euler("z", heading_deg, degrees=True) * pose
+    wrench = hand(character, body, np.zeros(3), normal=SLOPE, height=height)
+    np.testing.assert_allclose(wrench[:5], 0.0, atol=1e-3)
+    return wrench[5]
+
+
+@pytest.mark.parametrize(("pose", "legs_deg"), [(SUPINE, 0), (PRONE, 180), (SITTING, 0)])
+def test_it_turns_legs_that_are_up_the_slope_until_they_are_across(character, pose, legs_deg):
+    """Legs at 0 degrees point down the slope; they are left alone up to 1.2 rad (69 degrees)."""
+    for angle in (-65, 0, 65):
+        assert turn(character, pose, angle - legs_deg) == pytest.approx(0.0, abs=1e-2)
+    for angle in (80, 170):
+        assert turn(character, pose, angle - legs_deg) < -10.0
+        assert turn(character, pose, -angle - legs_deg) > 10.0
+    assert turn(character, pose, 170 - legs_deg) == pytest.approx(-0.25 * MOST)
+
+
+def test_it_turns_nobody_on_even_ground_nor_who_has_risen(character):
+    assert turn(character, SITTING, 170, height=0.8) == pytest.approx(0.0, abs=1e-3)
+    assert turn(character, SITTING, 170, height=0.7) != pytest.approx(0.0, abs=1.0)
+    even = hand(character, SUPINE, np.zeros(3), height=0.2)
+    np.testing.assert_allclose(even, 0.0, atol=1e-3)
 
 
 def test_levels_fall_with_success_rise_with_failure_and_stay_in_range():

@@ -151,8 +151,8 @@ def test_states_made_in_chunks_are_the_same(engine, character, monkeypatch):
     jax.tree.map(np.testing.assert_array_equal, whole, parts)
 
 
-def test_misfits_are_classes_of_the_first_reward(uneven):
-    """One minus the worked-out reward, in quarters; the task above has no focus and needs none."""
+def test_misfits_are_classes_of_how_far_the_neck_is_below_the_curve(uneven):
+    """In steps of 6 cm; the task above has no focus and needs none."""
     env, world = uneven.environment, uneven.world
     assert world.pool.misfit is None
     found = np.asarray(misfit.classes(world.pool, env.observer, world.terrain, world.points))
@@ -161,12 +161,12 @@ def test_misfits_are_classes_of_the_first_reward(uneven):
     np.testing.assert_array_equal(found[table[STANDING]], 0)
     np.testing.assert_array_equal(found[table[CLIP, 0]], 0)
     kinematics = world.pool.physics.kinematics
-    value = np.asarray(env.observer.posture(kinematics, world.terrain).features, np.float64)
+    height = np.asarray(env.observer.posture(kinematics, world.terrain).features[:, 0])
     for style in range(2):
         row = table[LYING, 1:, style]
-        gap = np.abs(value[row] - np.asarray(world.points)[style, 0])
-        reward = np.exp(-1.7 * gap[..., 0] - 1.5 * (gap[..., 1] + gap[..., 2]))
-        np.testing.assert_array_equal(found[row], np.minimum(np.floor(4 * (1 - reward)), 3))
+        below = np.asarray(world.points)[style, 0, 0] - height[row]
+        steps = np.select([below < 0.06, below < 0.12, below < 0.18], [0, 1, 2], 3)
+        np.testing.assert_array_equal(found[row], steps)
     assert len(np.unique(found)) > 1
 
 

@@ -218,7 +218,8 @@ class GetUpTask:
         measured = state.observation[:, self.observer.slices()["features"]]
         target = self.targets(world, state)[:, 0]
         kinematics = state.physics.kinematics
-        return assist.wrench(self.observer.links, kinematics, measured, target, state.lift)
+        normal = world.terrain.normal(kinematics.qpos[:, :2])
+        return assist.wrench(self.observer.links, kinematics, measured, target, normal, state.lift)
 
     def servo_target(self, world: World, state: EpisodeState, filtered: jax.Array) -> jax.Array:
         """Hinge targets [B, J]: q = decoder(z, c) + dq [P 3.4], c the curve values now."""
