@@ -117,8 +117,8 @@ def test_levels_fall_with_success_rise_with_failure_and_stay_in_range():
     cell = (jnp.asarray([0, 1, 1, 2, 3]),)
     ended = jnp.asarray([True, True, True, False, True])
     success = jnp.asarray([False, True, True, True, True])
-    after = np.asarray(assist.update(level, cell, ended, success))
-    np.testing.assert_allclose(after, [1.0, 0.5 - 2 * assist.FALL, 0.5, 0.0], atol=1e-6)
+    after = np.asarray(assist.update(level, cell, ended, success, (0.03, 0.01)))
+    np.testing.assert_allclose(after, [1.0, 0.44, 0.5, 0.0], atol=1e-6)
 
 
 def test_the_engine_carries_the_weight_for_one_step_only(character, engine):
@@ -192,6 +192,23 @@ def test_success_with_the_hand_lowers_its_level_and_is_not_counted(helped, first
     assert (np.asarray(after.focus)[:CLIP] == 0.5).all()
 
 
+def test_it_lets_go_in_time(helped, first):
+    """After .1 s of an episode: three control steps of 1 / 30 s."""
+    env = helped.environment
+    env = dataclasses.replace(env, config=dataclasses.replace(env.config, assist_s=0.1))
+    steps = np.arange(6)
+    state = env.start(helped.world, jnp.zeros(6, int), jnp.full(6, LYING), jnp.zeros(6, int))
+    # half way up the curve, where the body still lies
+    state = state.replace(
+        lift=jnp.full(6, 100.0),
+        time=0.5 * state.duration,
+        record=state.record.replace(rise_steps=jnp.asarray(steps - steps // 2, jnp.int32),
+                                    stand_steps=jnp.asarray(steps // 2, jnp.int32)),
+    )  # fmt: skip
+    wrench = np.asarray(env._hand(helped.world, state))
+    np.testing.assert_array_equal(np.abs(wrench).max(axis=-1) > 1.0, steps < 3)
+
+
 def test_evaluation_has_no_hand(helped):
     assert whole_episodes(helped.environment.config).assist == 0.0
 
@@ -199,6 +216,10 @@ def test_evaluation_has_no_hand(helped):
 def test_the_hand_needs_the_focus_whose_cells_it_has():
     with pytest.raises(ConfigError, match=r"task\.focus: .*task\.assist"):
         TaskConfig(assist=0.5)
+    with pytest.raises(ConfigError, match=r"task\.assist_s: .*more than 0"):
+        TaskConfig(assist_s=0.0)
+    with pytest.raises(ConfigError, match=r"task\.assist_rates: .*more than 0"):
+        TaskConfig(assist_rates=(0.02, 0.0))
 
 
 def test_what_an_episode_starts_from_is_drawn_independently(helped):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 from getup_jax.config.check import require
 
@@ -35,6 +36,8 @@ class TaskConfig:
     assist: float = (
         0.0  # share of the weight that a helping hand lifts at most, until starts succeed
     )
+    assist_s: float = math.inf  # it lets go so long after the start, in any case
+    assist_rates: tuple[float, float] = (0.02, 0.01)  # less of it for a success, more for a failure
     assist_share: float = 0.5  # share of the lying and clip starts with the hand; needs focus
     curve_match_rad: float = 0.52  # largest gap between a curve's and a pose's torso angles
     # 0: starts are drawn evenly; towards 1: at the frontier of what is learned, and on irregular
@@ -51,6 +54,9 @@ class TaskConfig:
         require(0 <= self.focus < 1, "task.focus", "at least 0 and less than 1", self.focus)
         require(0 <= self.short_share < 1, "task.short_share", "0 to below 1", self.short_share)
         require(self.assist >= 0, "task.assist", "at least 0", self.assist)
+        ok = min(self.assist_rates) > 0
+        require(ok, "task.assist_rates", "two numbers more than 0", self.assist_rates)
+        require(self.assist_s > 0, "task.assist_s", "more than 0", self.assist_s)
         ok = self.assist == 0 or self.focus > 0
         require(ok, "task.focus", "more than 0 where task.assist is", self.focus)
         ok = 0 <= self.assist_share < 1

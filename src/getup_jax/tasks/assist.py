@@ -2,12 +2,13 @@
 
 It lifts like a rope while the neck is below the curve, and turns the pelvis towards the curve's
 torso angles, so that it needs no more than the curve. On a slope it also turns a body that lies or
-sits with its legs up the slope, until they are across it: from there nobody gets on the feet. What it may give at most is a share of the
-full hand, its level; every cell of `focus.py` has its own. A level falls with each success of an
-episode that started there with the hand, and rises with each failure, so that a third of them
-succeed until the hand is gone (compare Yu et al. 2018, Learning symmetric and low-energy
-locomotion). Starts with the hand are drawn at a frontier of their own, that of 1 - level: with it
-a whole rise is learned before its parts are without. Evaluation has no hand.
+sits with its legs up the slope, until they are across it: from there nobody gets on the feet. What
+it may give at most is a share of the full hand, its level; every cell of `focus.py` has its own. A
+level falls with each success of an episode that started there with the hand, and rises with each
+failure, so that a third of them (at the default rates) succeed until the hand is gone (compare Yu
+et al. 2018, Learning symmetric and low-energy locomotion). Starts with the hand are drawn at a
+frontier of their own, that of 1 - level: with it a whole rise is learned before its parts are
+without. Evaluation has no hand.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ import jax.numpy as jnp
 from getup_jax.motion.features import FeatureLinks, torso_axes
 from getup_jax.types import Kinematics
 
-FALL, RISE = 0.02, 0.01  # change of a level at a success and at a failure
 _FULL_AT_M = 0.15  # below the curve, where the lift is at its most
 _FULL_AT_RAD = 0.5  # off the curve's angles, where the turn is at its most
 _TURN_NM_PER_N = 0.25  # m, the most turn for the most lift
@@ -81,8 +81,16 @@ def _legs_up_the_slope(axes: jax.Array, height: jax.Array, normal: jax.Array) ->
 
 
 def update(
-    level: jax.Array, cell: tuple[jax.Array, ...], ended: jax.Array, success: jax.Array
+    level: jax.Array,
+    cell: tuple[jax.Array, ...],
+    ended: jax.Array,
+    success: jax.Array,
+    rates: tuple[float, float],
 ) -> jax.Array:
-    """The levels after episodes [B] with the hand that ended; cell holds their indices [B]."""
-    change = jnp.where(success, -FALL, RISE) * ended
+    """The levels after episodes [B] with the hand that ended; cell holds their indices [B].
+
+    rates: by how much a success lowers a level, and a failure raises it.
+    """
+    fall, rise = rates
+    change = jnp.where(success, -fall, rise) * ended
     return jnp.clip(level.at[cell].add(change), 0.0, 1.0)

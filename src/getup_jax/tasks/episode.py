@@ -41,6 +41,11 @@ class Record:
         zero, none = jnp.zeros(size, jnp.float32), jnp.zeros(size, jnp.int32)
         return cls(zero, zero, none, jnp.full(size, jnp.inf, jnp.float32), zero, zero, none)
 
+    @property
+    def steps(self) -> jax.Array:
+        """Control steps [B] int32 that were taken."""
+        return self.rise_steps + self.stand_steps
+
 
 @struct.dataclass
 class EpisodeState:

@@ -89,7 +89,9 @@ class GetUpTask:
         """One control step; episodes that end start anew."""
         after, output = self.advance(world, state, action)
         key_next, key_reset = jax.random.split(state.key)
-        learned, levels = practice.learned(world.pool, after, output, self.engine.control_dt)
+        learned, levels = practice.learned(
+            self.config, world.pool, after, output, self.engine.control_dt
+        )
         progress, output = practice.progress(self.terrain, after, output)
         size = action.shape[0]
         drawn = draw_starts(self.config, world, key_reset, size, learned, progress, levels)
@@ -219,7 +221,9 @@ class GetUpTask:
         target = self.targets(world, state)[:, 0]
         kinematics = state.physics.kinematics
         normal = world.terrain.normal(kinematics.qpos[:, :2])
-        return assist.wrench(self.observer.links, kinematics, measured, target, normal, state.lift)
+        held = state.record.steps * self.engine.control_dt < self.config.assist_s
+        most = jnp.where(held, state.lift, 0.0)
+        return assist.wrench(self.observer.links, kinematics, measured, target, normal, most)
 
     def servo_target(self, world: World, state: EpisodeState, filtered: jax.Array) -> jax.Array:
         """Hinge targets [B, J]: q = decoder(z, c) + dq [P 3.4], c the curve values now."""
@@ -294,5 +298,4 @@ class GetUpTask:
     def _full_steps(self, state: EpisodeState) -> jax.Array:
         """Steps [B] that an episode with this start has, if it does not end early."""
         left = state.duration + self.config.stand_time_s - state.time
-        taken = state.record.stand_steps + state.record.rise_steps
-        return taken + jnp.round(left / self.engine.control_dt)
+        return state.record.steps + jnp.round(left / self.engine.control_dt)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
-from getup_jax.config import TerrainConfig
+from getup_jax.config import TaskConfig, TerrainConfig
 from getup_jax.tasks import assist, curriculum, focus, running
 from getup_jax.tasks.episode import EpisodeState, stands
 from getup_jax.tasks.reset_pool import Pool
@@ -14,8 +14,7 @@ from getup_jax.types import StepOutput
 
 def first_cell(pool: Pool, state: EpisodeState, control_dt: float) -> tuple[jax.Array, ...]:
     """Indices [B] of the cells of `focus.py` in which the episodes started."""
-    steps = state.record.rise_steps + state.record.stand_steps
-    begin = (state.time - steps * control_dt) / state.duration
+    begin = (state.time - state.record.steps * control_dt) / state.duration
     place = focus.place_of(pool, state.kind, state.region)
     return place, state.getup, focus.part_of(begin, state.misfit)
 
@@ -33,7 +32,7 @@ def is_alone(state: EpisodeState) -> jax.Array:
 
 
 def learned(
-    pool: Pool, state: EpisodeState, output: StepOutput, control_dt: float
+    config: TaskConfig, pool: Pool, state: EpisodeState, output: StepOutput, control_dt: float
 ) -> tuple[jax.Array | None, jax.Array | None]:
     """The focus and the hand's levels [3 R, G, bins] after the episodes that end with this step.
 
@@ -48,7 +47,8 @@ def learned(
     after = running.update(state.focus, cell, ended & alone, success, focus.RATE)
     if state.assist is None:
         return after, None
-    return after, assist.update(state.assist, cell, ended & ~alone, success)
+    ended &= ~alone
+    return after, assist.update(state.assist, cell, ended, success, config.assist_rates)
 
 
 def progress(
