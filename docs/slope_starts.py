@@ -45,8 +45,8 @@ def main() -> None:
     loaded = checkpoint.load_policy(args.ckpt)
     if loaded.config.terrain is None:
         raise ConfigError(f"--ckpt {args.ckpt}: was trained on a flat plane, which has no slopes")
-    if args.rows < 1 or args.until <= 0:
-        raise ConfigError("--rows and --until: expected at least 1 and more than 0")
+    if args.rows < 1 or args.hand < 0 or args.until <= 0:
+        raise ConfigError("--rows, --hand, --until: expected at least 1, at least 0, more than 0")
     prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
     config = _config(loaded.config, args)
     task = build_task(config, print, prior)
