@@ -36,6 +36,13 @@ class LearnerState:
     policy: Policy
     count: jax.Array
 
+    @property
+    def averaged_policy(self) -> Policy:
+        return self.policy
+
+    def beginning_with(self, policy: Policy) -> LearnerState:
+        return LearnerState(policy, self.count)
+
 
 @struct.dataclass
 class State:

@@ -24,7 +24,7 @@ from getup_jax import manifest
 from getup_jax.config import Config, ConfigError
 from getup_jax.manifest import DamagedError
 from getup_jax.paths import asset_path
-from getup_jax.settings import dump_yaml, load_config
+from getup_jax.settings import dump_yaml, load_saved_config
 from getup_jax.storage import CheckpointError, from_nested, read_item, to_nested, write_item
 
 CHECKPOINTS = "checkpoints"  # folder of a run that holds its checkpoints
@@ -114,7 +114,7 @@ def load_policy(path: str | Path) -> LoadedPolicy:
     """
     found, nested, metadata = _read_newest(find_checkpoints(path), POLICY)
     try:
-        config = load_config(found / "config.yaml")
+        config = load_saved_config(found / "config.yaml")
     except ConfigError as error:
         hint = "it was written with other settings; use the version of getup_jax that wrote it"
         raise CheckpointError(f"{found}: {error}; {hint}") from None

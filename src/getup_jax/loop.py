@@ -106,6 +106,7 @@ class Loop:
         self._display.log(f"starting with the policy of {loaded.path}")
         if self._config.train.init_learner:
             self._load_learner(path)
+            policy = self._state.learner.policy  # not the average of its weights
         if self._job.carry_over is not None:
             policy = self._job.carry_over(policy, loaded, self._display.log)
         self._begin_with(policy)
@@ -122,7 +123,7 @@ class Loop:
 
     def _begin_with(self, policy: Any) -> None:
         # a copy: what the first iteration donates must be nobody else's
-        learner = dataclasses.replace(self._state.learner, policy=owned(policy))
+        learner = owned(self._state.learner.beginning_with(policy))
         self._state = dataclasses.replace(self._state, learner=learner)
 
     def _compile(self) -> Step:
@@ -152,7 +153,7 @@ class Loop:
     def _save(self) -> None:
         if self.saved is not None and int(self.saved.name) == self.done:
             return
-        item = to_nested({"policy": self._state.learner.policy, "prior": self._job.prior})
+        item = to_nested({"policy": self._state.learner.averaged_policy, "prior": self._job.prior})
         if not is_finite(item):
             raise self._error("a weight of the policy is not a finite number")
         metadata = {"steps": self.steps}

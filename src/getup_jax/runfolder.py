@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from getup_jax.config import Config, ConfigError
-from getup_jax.settings import dump_yaml, load_config, to_dict
+from getup_jax.settings import dump_yaml, load_saved_config, to_dict
 
 CONFIG = "config.yaml"
 
@@ -50,7 +50,7 @@ def resume_command(folder: Path) -> str:
 
 def _log_changes(file: Path, config: Config, log: Callable[[str], None]) -> None:
     try:
-        before = _flat(to_dict(load_config(file)))
+        before = _flat(to_dict(load_saved_config(file)))
     except ConfigError as error:
         log(f"the run's earlier settings cannot be read and are replaced: {error}")
         return

@@ -18,6 +18,12 @@ from getup_jax.config import Config, ConfigError
 from getup_jax.convert import Text, describe, section
 from getup_jax.paths import config_path, shipped_configs
 
+# Settings that are no more: what to use instead. What was saved with them is read without them.
+RETIRED = {
+    "ppo.critic_rate_scale": "ppo.critic_learning_rate, which does not follow the actor's",
+    "ppo.value_coefficient": "nothing: the critic has an optimiser of its own",
+}
+
 
 def load_config(path: str | Path | None, overrides: Sequence[str] = ()) -> Config:
     """The defaults, changed by a YAML file (None: by none) and then by overrides.
@@ -25,9 +31,30 @@ def load_config(path: str | Path | None, overrides: Sequence[str] = ()) -> Confi
     Raises ConfigError that names the key, or the file and line.
     """
     file = None if path is None else find_config(path)
-    from_file = {} if file is None else _read_yaml(file)
+    return _build(file, {} if file is None else _read_yaml(file), overrides)
+
+
+def load_saved_config(file: Path) -> Config:
+    """What `dump_yaml` wrote, also of an earlier version with settings that are RETIRED now."""
+    values = _read_yaml(file)
+    for key in RETIRED:
+        _remove(values, *key.split("."))
+    return _build(file, values, ())
+
+
+def _remove(values: dict[str, Any], section_name: str, name: str) -> None:
+    inner = values.get(section_name)
+    if isinstance(inner, dict):
+        inner.pop(name, None)
+
+
+def _build(file: Path | None, from_file: dict[str, Any], overrides: Sequence[str]) -> Config:
     try:
         merged = functools.reduce(_merge, map(_parse_override, overrides), from_file)
+        for key, instead in RETIRED.items():
+            first, name = key.split(".")
+            if isinstance(merged.get(first), dict) and name in merged[first]:
+                raise ConfigError(f"{key}: is no setting any more; use {instead}")
         return section(merged, Config, "", None)
     except ConfigError as error:
         if file is None or not _is_bad(from_file):

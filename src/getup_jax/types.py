@@ -108,6 +108,9 @@ class Environment(Protocol):
 
     An observation may start with a history of frames. The environment then has `frames`, their
     number F and size I, and the first F * I numbers are the frames, the oldest one first.
+
+    It may have `stagger(state, key) -> state`: fresh episodes made to end at different times. A
+    training begins with it, so that its episodes do not run in lockstep.
     """
 
     @property

@@ -92,3 +92,25 @@ def test_a_least_std_keeps_small_variations_small():
     moments = normalize.moments_of(jnp.asarray([[0.0, -0.01], [4.0, 0.01]]), jnp.zeros(2))
     found = normalize.normalize(moments, jnp.asarray([[4.0, 0.01]]), least_std=0.1)
     np.testing.assert_allclose(found, [[1.0, 0.1]], rtol=1e-3)
+
+
+def test_a_horizon_follows_what_comes_later():
+    rng = np.random.default_rng(1)
+    early, late = (rng.normal(size=(40, 500, 1)).astype(np.float32) + m for m in (0.0, 5.0))
+    forgetful = cumulative = normalize.initial(1)
+    for batch in (*early, *late):
+        forgetful = normalize.update(forgetful, jnp.asarray(batch), horizon=2000.0)
+        cumulative = normalize.update(cumulative, jnp.asarray(batch))
+    assert float(forgetful.count) == 2500.0
+    np.testing.assert_allclose(cumulative.mean, 2.5, atol=0.1)
+    # a fifth of what it knows is new in every batch: .8^40 of the early ones is left
+    np.testing.assert_allclose(forgetful.mean, 5.0 * (1 - 0.8**40), atol=0.1)
+    np.testing.assert_allclose(forgetful.variance, 1.0, rtol=0.1)
+
+
+def test_a_horizon_changes_nothing_before_it_is_reached():
+    batch = jnp.asarray(np.random.default_rng(2).normal(size=(100, 3)), jnp.float32)
+    one = normalize.update(normalize.update(normalize.initial(3), batch), batch, horizon=1000.0)
+    other = normalize.update(normalize.update(normalize.initial(3), batch), batch)
+    np.testing.assert_array_equal(one.mean, other.mean)
+    np.testing.assert_array_equal(one.variance, other.variance)

@@ -3,6 +3,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optax
 import pytest
 
 from getup_jax.algo import popart
@@ -85,3 +86,28 @@ def test_constant_target_stays_finite():
     assert isinstance(statistics, PopArt)
     np.testing.assert_allclose(statistics.std, popart.MIN_STD)
     np.testing.assert_allclose(popart.normalize(statistics, jnp.full((8, 1), 5.0)), 0.0, atol=1e-2)
+
+
+def test_moments_of_the_last_layer_move_as_its_gradients_do(variables: dict):
+    adam = optax.scale_by_adam()
+    old = popart.initial(3)
+    new = popart.update(old, _targets(0))
+    target = _targets(1).reshape(-1, 3)[:100]
+
+    def gradient(variables: dict, statistics: PopArt):
+        def loss(variables: dict):
+            miss = CRITIC.apply(variables, INPUTS) - popart.normalize(statistics, target)
+            return jnp.mean(jnp.square(miss))
+
+        return jax.grad(loss)(variables)
+
+    before = adam.update(gradient(variables, old), adam.init(variables))[1]
+    moved = popart.rescale(variables, old, new)
+    expected = adam.update(gradient(moved, new), adam.init(variables))[1]
+    found = popart.rescale_moments(before, old, new)
+    for name in ("kernel", "bias"):
+        for moment in ("mu", "nu"):
+            one, other = (getattr(s, moment)["params"]["output"][name] for s in (found, expected))
+            np.testing.assert_allclose(one, other, rtol=2e-3, atol=1e-6)
+    hidden = (s.mu["params"]["hidden_0"]["kernel"] for s in (found, before))
+    np.testing.assert_array_equal(*hidden)

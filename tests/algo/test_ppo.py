@@ -6,7 +6,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from getup_jax.algo import ppo
-from getup_jax.algo.ppo import LossTerms, Samples
+from getup_jax.algo.ppo import ActorTerms, Samples
 from getup_jax.nets import gaussian
 
 N, K, A = 64, 3, 4
@@ -68,10 +68,10 @@ def test_gradient_vanishes_where_clipped():
     assert_allclose(gradient, [0.0, -0.5])
 
 
-def test_value_loss_and_total_by_hand():
+def test_losses_of_actor_and_critic_by_hand():
     assert float(ppo.value_loss(jnp.zeros((2, 1)), jnp.asarray([[1.0], [3.0]]))) == 5.0
-    terms = LossTerms(policy=jnp.float32(1.0), value=jnp.float32(5.0), entropy=jnp.float32(2.0))
-    assert_allclose(ppo.total_loss(terms, 0.5, 0.1), 1.0 + 2.5 - 0.2, rtol=1e-6)
+    terms = ActorTerms(policy=jnp.float32(1.0), entropy=jnp.float32(2.0))
+    assert_allclose(ppo.actor_loss(terms, 0.1), 1.0 - 0.2, rtol=1e-6)
 
 
 def test_standardize_each_objective():
@@ -116,9 +116,8 @@ def test_terms_of_an_unchanged_policy():
         target=jnp.asarray(target),
     )
     weights = jnp.full(K, 1 / K)
-    terms, metrics = ppo.loss_terms(mean, samples.target + 2.0, samples, std, weights, CLIP)
+    terms, metrics = ppo.actor_terms(mean, samples, std, weights, CLIP)
     # The ratio is 1: the surrogate is the mean advantage, and nothing has moved.
     assert_allclose(terms.policy, -advantage.mean(), atol=1e-6)
-    assert_allclose(terms.value, 4.0, rtol=1e-5)
     assert_allclose(terms.entropy, gaussian.entropy(std))
     assert float(metrics["ppo/kl"]) == float(metrics["ppo/clip_fraction"]) == 0.0

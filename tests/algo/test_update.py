@@ -7,8 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from getup_jax.algo.update import (
-    ADAM_EPSILON,
+    ACTOR_EPSILON,
+    FIRST_SCALE,
     adapt_scale,
+    first_scale,
     make_optimiser,
     run_minibatches,
     shuffled_minibatches,
@@ -41,7 +43,7 @@ def _slow_adam(parameter, x, rows, rate, max_norm):
         m = 0.9 * m + 0.1 * gradient
         v = 0.999 * v + 0.001 * gradient**2
         root = np.sqrt(v / (1 - 0.999**step))
-        parameter -= rate * (m / (1 - 0.9**step)) / (root + ADAM_EPSILON)
+        parameter -= rate * (m / (1 - 0.9**step)) / (root + ACTOR_EPSILON)
     return parameter, np.mean(errors), np.mean(norms)
 
 
@@ -49,7 +51,7 @@ def _slow_adam(parameter, x, rows, rate, max_norm):
 def test_updates_match_slow_adam(max_norm: float):
     x = np.random.default_rng(0).normal(size=40).astype(np.float32) + 3.0
     rows = np.asarray(shuffled_minibatches(jax.random.key(0), 2, 40, 10))
-    optimiser = make_optimiser(max_norm, jnp.asarray(0.1))
+    optimiser = make_optimiser(max_norm, jnp.asarray(0.1), ACTOR_EPSILON)
     start = jnp.zeros(())
     parameter, state, metrics = run_minibatches(
         _loss, optimiser, start, optimiser.init(start), jnp.asarray(x), jnp.asarray(rows)
@@ -57,23 +59,31 @@ def test_updates_match_slow_adam(max_norm: float):
     expected, error, norm = _slow_adam(0.0, x, rows, 0.1, max_norm)
     assert_allclose(parameter, expected, rtol=1e-4)
     assert_allclose(metrics["error"], error, rtol=1e-4)
-    assert_allclose(metrics["ppo/gradient_norm"], norm, rtol=1e-4)
-    assert jax.tree.structure(state) == jax.tree.structure(make_optimiser(1.0, 0.0).init(start))
+    assert_allclose(metrics["gradient_norm"], norm, rtol=1e-4)
+    fresh = make_optimiser(1.0, 0.0, ACTOR_EPSILON).init(start)
+    assert jax.tree.structure(state) == jax.tree.structure(fresh)
 
 
-def test_scale_follows_the_clip_fraction():
-    one = jnp.ones(())
-    assert_allclose(adapt_scale(one, jnp.asarray(0.30), 0.15), 1 / 1.2, rtol=1e-6)
-    assert_allclose(adapt_scale(one, jnp.asarray(0.05), 0.15), 1.2, rtol=1e-6)
-    assert_allclose(adapt_scale(one, jnp.asarray(0.15), 0.15), 1.0)
-    assert_allclose(adapt_scale(one, jnp.asarray(0.30), None), 1.0)
+@pytest.mark.parametrize(
+    ("clip_fraction", "factor"),
+    [(0.15, 1.0), (0.30, 1 / 1.2), (0.40, 1 / 1.5), (0.10, 1.2), (0.05, 1.5)],
+)
+def test_scale_follows_the_clip_fraction(clip_fraction: float, factor: float):
+    scale = adapt_scale(jnp.asarray(0.5), jnp.asarray(clip_fraction), 0.15)
+    assert_allclose(scale, 0.5 * factor, rtol=1e-6)
 
 
-def test_scale_is_bounded():
-    scale = jnp.ones(())
+def test_scale_stays_without_a_target():
+    assert_allclose(adapt_scale(jnp.ones(()), jnp.asarray(0.30), None), 1.0)
+    assert float(first_scale(None)) == 1.0
+
+
+def test_scale_never_passes_the_schedule():
+    scale = first_scale(0.15)
+    assert_allclose(scale, FIRST_SCALE)
     for _ in range(40):
-        scale = adapt_scale(scale, jnp.asarray(0.9), 0.15)
-    assert_allclose(scale, 0.05)
-    for _ in range(80):
         scale = adapt_scale(scale, jnp.asarray(0.0), 0.15)
-    assert_allclose(scale, 5.0)
+    assert_allclose(scale, 1.0)
+    for _ in range(80):
+        scale = adapt_scale(scale, jnp.asarray(0.9), 0.15)
+    assert_allclose(scale, 1e-3)

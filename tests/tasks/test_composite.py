@@ -184,6 +184,15 @@ def test_goals_join_the_observation_the_rewards_and_the_counts(character):
     assert_allclose(share[np.isfinite(share)], 1.0)
 
 
+def test_staggered_episodes_are_at_different_steps(built, steps):
+    _, states, _ = steps
+    env = built.environment
+    last = round(env.config.episode_s / env.engine.control_dt)
+    step = np.asarray(env.stagger(states[0], jax.random.key(1)).step)
+    assert len(np.unique(step)) > SIZE // 2
+    assert ((step >= 0) & (step < last)).all()
+
+
 def test_a_goals_mistake_names_its_key(character):
     composite = dataclasses.replace(CONFIG.composite, goals={"target_locaton": {}})
     with pytest.raises(ConfigError, match=r"composite\.goals: .*target_location"):

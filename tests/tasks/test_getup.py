@@ -296,6 +296,19 @@ def test_step_resets_what_has_ended_and_nothing_else(jitted):
         assert (pool == row).all(axis=1).any()
 
 
+def test_staggered_episodes_are_cut_at_different_times_and_say_nothing_of_success(jitted):
+    state = jitted.start(LYING, CURVE_STYLE)
+    whole = state.duration + jitted.task.config.stand_time_s
+    cut = jitted.task.stagger(state, jax.random.PRNGKey(5)).until
+    assert len(np.unique(cut)) == B
+    assert ((cut >= state.time) & (cut <= whole)).all()
+    staggered = state.replace(until=cut, time=cut - 1e-3, key=jax.random.PRNGKey(3))
+    after, output = jitted.step(jitted.world, staggered, state.action)
+    np.testing.assert_array_equal(output.truncated, True)
+    assert np.isnan(output.episode["success"]).all()
+    np.testing.assert_array_equal(after.until, np.inf)  # what comes after runs to its end
+
+
 def test_a_broken_simulation_is_reset_without_reward_and_the_run_goes_on(jitted):
     state = jitted.start(STANDING)
     qpos = np.array(state.physics.kinematics.qpos)

@@ -12,7 +12,7 @@ from flax import linen as nn
 
 from getup_jax.algo import normalize, popart
 from getup_jax.algo.state import LearnerState, PolicyState
-from getup_jax.algo.update import make_optimiser
+from getup_jax.algo.update import ACTOR_EPSILON, first_scale, make_optimiser
 from getup_jax.config import NetworkConfig, PPOConfig
 from getup_jax.nets.mlp import MLP
 from getup_jax.nets.recurrent import HistoryMLP
@@ -23,6 +23,10 @@ ACTOR_OUTPUT_SCALE = 0.01
 
 # Logit of the first weight of a meta policy's action: 0.88, so that learning starts near it.
 META_LOGIT = 2.0
+
+# Samples that the observations' statistics remember: after 100 M, those of what a curriculum opened
+# last would hardly move them.
+MEMORY_STEPS = 1e7
 
 Network = MLP | HistoryMLP
 
@@ -45,16 +49,17 @@ class ActorCritic:
         observation = jnp.zeros(self.observation_size, jnp.float32)
         actor = self.actor.init(key_actor, observation)
         critic = self.critic.init(key_critic, observation)
+        optimiser = make_optimiser(config.max_gradient_norm, 0.0, ACTOR_EPSILON)
         normalized = config.normalize_observation
         statistics = normalize.initial(self.observation_size) if normalized else None
         return LearnerState(
             policy=PolicyState(actor=actor, statistics=statistics),
             critic=critic,
-            optimiser=make_optimiser(config.max_gradient_norm, 0.0, config.critic_rate_scale).init(
-                (actor, critic)
-            ),
+            average=actor,
+            actor_optimiser=optimiser.init(actor),
+            critic_optimiser=optimiser.init(critic),
             popart=popart.initial(self.critic.output_size) if config.popart else None,
-            learning_rate_scale=jnp.ones((), jnp.float32),
+            learning_rate_scale=first_scale(config.target_clip_fraction),
         )
 
     def mean(self, actor: Any, normalized: jax.Array) -> jax.Array:
@@ -140,5 +145,5 @@ def observe(policy: PolicyState, observation: jax.Array) -> PolicyState:
     if policy.statistics is None:
         return policy
     size = policy.statistics.mean.size
-    statistics = normalize.update(policy.statistics, observation[..., :size])
+    statistics = normalize.update(policy.statistics, observation[..., :size], MEMORY_STEPS)
     return dataclasses.replace(policy, statistics=statistics)

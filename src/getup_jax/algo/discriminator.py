@@ -99,7 +99,6 @@ class Discriminator:
         variables, optimiser, metrics = run_minibatches(
             self._loss, self._optimiser(), state.variables, state.optimiser, pairs, rows
         )
-        metrics["gradient_norm"] = metrics.pop("ppo/gradient_norm")
         return DiscriminatorState(variables, optimiser, statistics, memory), metrics
 
     def _remember(

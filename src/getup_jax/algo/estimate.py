@@ -80,7 +80,10 @@ def normalize_targets(learner: LearnerState, target: jax.Array) -> tuple[Learner
         return learner, target
     statistics = popart.update(learner.popart, target)
     critic = popart.rescale(learner.critic, learner.popart, statistics)
-    learner = dataclasses.replace(learner, critic=critic, popart=statistics)
+    optimiser = popart.rescale_moments(learner.critic_optimiser, learner.popart, statistics)
+    learner = dataclasses.replace(
+        learner, critic=critic, critic_optimiser=optimiser, popart=statistics
+    )
     return learner, popart.normalize(statistics, target)
 
 

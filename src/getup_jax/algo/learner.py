@@ -17,30 +17,27 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from getup_jax.algo import ppo, schedule
+from getup_jax.algo import average, ppo, schedule
 from getup_jax.algo.actor_critic import ActorCritic, make_actor_critic, normalized, observe
 from getup_jax.algo.estimate import estimate
+from getup_jax.algo.improve import COSINE_EVERY, Improver
 from getup_jax.algo.objectives import Objectives
 from getup_jax.algo.rollout import Rollout, Transition, rollout, summarize
 from getup_jax.algo.state import LearnerState, PolicyState, TrainState, owned
-from getup_jax.algo.update import (
-    adapt_scale,
-    make_optimiser,
-    run_minibatches,
-    shuffled_minibatches,
-)
 from getup_jax.config import NetworkConfig, PPOConfig
 from getup_jax.nets import gaussian
 from getup_jax.types import Environment
 
-_JUDGE, _DISCRIMINATORS = 2, 3  # folded into keys, so that runs without them draw what they did
+# folded into keys, so that runs without them draw what they did
+_JUDGE, _DISCRIMINATORS, _STAGGER = 2, 3, 4
 
 
 @struct.dataclass
 class Stage:
     """The scheduled settings of one iteration."""
 
-    learning_rate: jax.Array  # [] with the adapted scale
+    learning_rate: jax.Array  # [] of the actor, with the adapted scale
+    critic_learning_rate: jax.Array  # []
     action_std: jax.Array  # [A]; where the actor gives the std, what it is multiplied by
 
 
@@ -58,9 +55,14 @@ class Learner:
     def init(self, world: Any, key: jax.Array) -> TrainState:
         """The state before the first iteration."""
         key_environment, key_learner, key_run = jax.random.split(key, 3)
+        environment = self.env.init(world, key_environment, self.config.num_envs)
+        # In lockstep, an iteration would see one phase of all episodes, and the next one another.
+        stagger = getattr(self.env, "stagger", None)
+        if stagger is not None:
+            environment = stagger(environment, jax.random.fold_in(key_environment, _STAGGER))
         state = TrainState(
             learner=self.init_learner(key_learner),
-            environment=self.env.init(world, key_environment, self.config.num_envs),
+            environment=environment,
             key=key_run,
             iteration=jnp.zeros((), jnp.int32),
         )
@@ -88,11 +90,7 @@ class Learner:
             world, state.learner, collected.transition, jax.random.fold_in(key, _JUDGE)
         )
         learner, samples, explained = estimate(self.model, learner, transition, self.config)
-        improved, metrics = self._improve(learner, samples, stage, key_update)
-        if self.config.critic_first > 0:
-            wait = state.iteration < self.config.critic_first
-            improved = _critic_only(wait, learner, improved)
-        learner = _unless_first(learner, improved)
+        learner, metrics = self._improve(state.iteration, learner, samples, stage, key_update)
         policy = observe(learner.policy, collected.transition.observation)
         metrics |= {
             "ppo/explained_variance": explained,
@@ -132,6 +130,7 @@ class Learner:
         std = config.action_std if self.model.initial_std is None else config.std_scale
         return Stage(
             learning_rate=scheduled(config.learning_rate) * state.learner.learning_rate_scale,
+            critic_learning_rate=scheduled(config.critic_learning_rate),
             action_std=jnp.full(self.env.action_size, scheduled(std)),
         )
 
@@ -160,62 +159,50 @@ class Learner:
         return dataclasses.replace(learner, discriminators=states), transition, metrics
 
     def _improve(
-        self, learner: LearnerState, samples: ppo.Samples, stage: Stage, key: jax.Array
+        self,
+        iteration: jax.Array,
+        learner: LearnerState,
+        samples: ppo.Samples,
+        stage: Stage,
+        key: jax.Array,
     ) -> tuple[LearnerState, dict[str, jax.Array]]:
-        """All epochs of updates of actor and critic, and the next iteration's rate scale."""
-        config = self.config
-        num_samples = config.num_envs * config.num_steps
+        """The learner after all updates of critic and actor."""
+        improver, std = self.improver, stage.action_std
+        metrics = {"ppo/gradient_cosine": self._cosine(iteration, learner, samples, std)}
+        improved, of_actor = improver.actor(learner, samples, stage.learning_rate, std, key)
+        if self.config.critic_first > 0:
+            # A policy that was trained before meets a critic that knows nothing yet.
+            improved = _select(iteration < self.config.critic_first, learner, improved)
+        improved, of_critic = improver.critic(improved, samples, stage.critic_learning_rate, key)
+        improved = _unless_first(learner, self._averaged(iteration, improved))
+        return improved, metrics | of_actor | of_critic
 
-        def loss(parameters: tuple[Any, Any], minibatch: ppo.Samples):
-            return self._loss(parameters, minibatch, stage.action_std)
-
-        (actor, critic), optimiser, metrics = run_minibatches(
-            loss,
-            make_optimiser(config.max_gradient_norm, stage.learning_rate, config.critic_rate_scale),
-            (learner.policy.actor, learner.critic),
-            learner.optimiser,
-            samples,
-            shuffled_minibatches(key, config.epochs, num_samples, config.minibatch_size),
+    def _cosine(
+        self, iteration: jax.Array, learner: LearnerState, samples: ppo.Samples, std: jax.Array
+    ) -> jax.Array:
+        """`Improver.gradient_cosine` in one of COSINE_EVERY iterations, else NaN."""
+        return jax.lax.cond(
+            iteration % COSINE_EVERY == 0,
+            lambda: self.improver.gradient_cosine(learner.policy.actor, samples, std),
+            lambda: jnp.asarray(jnp.nan, jnp.float32),
         )
-        scale = adapt_scale(
-            learner.learning_rate_scale, metrics["ppo/clip_fraction"], config.target_clip_fraction
-        )
-        learner = dataclasses.replace(
-            learner,
-            policy=dataclasses.replace(learner.policy, actor=actor),
-            critic=critic,
-            optimiser=optimiser,
-            learning_rate_scale=scale,
-        )
-        return learner, metrics
 
-    def _loss(
-        self, parameters: tuple[Any, Any], samples: ppo.Samples, std: jax.Array
-    ) -> tuple[jax.Array, dict[str, jax.Array]]:
-        """PPO's loss of (actor, critic) on one minibatch, and what to log of it."""
-        actor, critic = parameters
-        mean, std = self.model.distribution(actor, samples.observation, std)
-        output = self.model.output(critic, samples.observation)
-        weights = jnp.asarray(self.weights, jnp.float32)
-        terms, metrics = ppo.loss_terms(mean, output, samples, std, weights, self.config.clip)
-        metrics["ppo/action_std"] = jnp.mean(std)
-        value_coefficient = self.config.value_coefficient
-        return ppo.total_loss(terms, value_coefficient, self.config.entropy_coefficient), metrics
+    def _averaged(self, iteration: jax.Array, learner: LearnerState) -> LearnerState:
+        """With the newest actor in the average of its weights."""
+        updates = jnp.maximum(iteration - self.config.critic_first, 0)
+        samples = self.config.num_envs * self.config.num_steps
+        actor = average.update(learner.average, learner.policy.actor, updates, samples)
+        return dataclasses.replace(learner, average=actor)
+
+    @property
+    def improver(self) -> Improver:
+        """The updates, with this learner's networks and settings."""
+        return Improver(self.model, self.config, self.weights)
 
 
-def _critic_only(wait: jax.Array, learner: LearnerState, improved: LearnerState) -> LearnerState:
-    """The improved learner, with the old actor as long as wait [] is true.
-
-    A policy that was trained before meets a critic that knows nothing yet. The rate's scale adapts
-    all the same: it was low at the end of that training, and the first full step would be too far.
-    """
-
-    def old(before: jax.Array, after: jax.Array) -> jax.Array:
-        return jnp.where(wait, before, after)
-
-    actor = jax.tree.map(old, learner.policy.actor, improved.policy.actor)
-    policy = dataclasses.replace(improved.policy, actor=actor)
-    return dataclasses.replace(improved, policy=policy)
+def _select(mask: jax.Array, a: LearnerState, b: LearnerState) -> LearnerState:
+    """Learner a where mask [] is true, else b."""
+    return jax.tree.map(lambda x, y: jnp.where(mask, x, y), a, b)
 
 
 def _unless_first(learner: LearnerState, improved: LearnerState) -> LearnerState:
@@ -227,8 +214,7 @@ def _unless_first(learner: LearnerState, improved: LearnerState) -> LearnerState
     statistics = learner.policy.statistics
     if statistics is None:
         return improved
-    first = statistics.count == 0
-    return jax.tree.map(lambda old, new: jnp.where(first, old, new), learner, improved)
+    return _select(statistics.count == 0, learner, improved)
 
 
 def make_learner(

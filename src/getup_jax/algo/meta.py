@@ -108,6 +108,10 @@ class MetaTask:
         task = self.task.init(world.task, key_task, num_envs)
         return self._begin(task, self._join(world, task, key_meta), key_next)
 
+    def stagger(self, state: MetaState, key: jax.Array) -> MetaState:
+        """Fresh episodes that end at different times."""
+        return state.replace(task=self.task.stagger(state.task, key))
+
     def step(
         self, world: MetaWorld, state: MetaState, action: jax.Array
     ) -> tuple[MetaState, StepOutput]:

@@ -15,6 +15,8 @@ off is kept and added to the next step (Kahan 1965).
 
 from __future__ import annotations
 
+import math
+
 import jax
 import jax.numpy as jnp
 from flax import struct
@@ -79,9 +81,14 @@ def _add(mean: jax.Array, step: jax.Array) -> tuple[jax.Array, jax.Array]:
     return total, step - (total - mean)
 
 
-def update(moments: Moments, x: jax.Array) -> Moments:
-    """The running moments with a batch x[..., O] added."""
-    return merge(moments, moments_of(x, moments.mean))
+def update(moments: Moments, x: jax.Array, horizon: float = math.inf) -> Moments:
+    """The running moments with a batch x[..., O] added.
+
+    What was seen before counts for at most `horizon` samples: a longer run forgets, as a moving
+    average does, and so follows what it is shown later.
+    """
+    before = moments.replace(count=jnp.minimum(moments.count, horizon))
+    return merge(before, moments_of(x, moments.mean))
 
 
 def normalize(moments: Moments, x: jax.Array, least_std: float = 0.0) -> jax.Array:

@@ -17,6 +17,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import optax
 from flax import struct
 
 from getup_jax.nets.mlp import OUTPUT_LAYER
@@ -75,8 +76,28 @@ def denormalize(popart: PopArt, output: jax.Array) -> jax.Array:
 
 def rescale(critic: dict[str, Any], old: PopArt, new: PopArt) -> dict[str, Any]:
     """The critic's variables with the last layer moved, so that every value is preserved."""
-    layers = critic["params"]
+    moved = _scale_output(critic, old.std / new.std)
+    moved["params"][OUTPUT_LAYER]["bias"] += (old.mean - new.mean) / new.std
+    return moved
+
+
+def rescale_moments(optimiser: Any, old: PopArt, new: PopArt) -> Any:
+    """Adam's state of the critic with the moments of the last layer moved along with it.
+
+    An error of the same size in return units is std / std' as large in the new ones, and so is the
+    last layer's gradient; its square goes with the square. Moments in the old units would take the
+    next steps for too small or too large.
+    """
     ratio = old.std / new.std
-    kernel = layers[OUTPUT_LAYER]["kernel"] * ratio
-    bias = layers[OUTPUT_LAYER]["bias"] * ratio + (old.mean - new.mean) / new.std
-    return {**critic, "params": {**layers, OUTPUT_LAYER: {"kernel": kernel, "bias": bias}}}
+    return optax.tree.set(
+        optimiser,
+        mu=_scale_output(optax.tree.get(optimiser, "mu"), ratio),
+        nu=_scale_output(optax.tree.get(optimiser, "nu"), jnp.square(ratio)),
+    )
+
+
+def _scale_output(critic: dict[str, Any], ratio: jax.Array) -> dict[str, Any]:
+    """The critic's variables, or their moments, with the last layer times ratio [K]."""
+    layers = critic["params"]
+    output = {name: x * ratio for name, x in layers[OUTPUT_LAYER].items()}
+    return {**critic, "params": {**layers, OUTPUT_LAYER: output}}

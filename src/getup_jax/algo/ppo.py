@@ -25,27 +25,20 @@ class Samples:
 
 
 @struct.dataclass
-class LossTerms:
-    """The terms of the loss before their coefficients, float32 scalars."""
+class ActorTerms:
+    """The terms of the actor's loss before their coefficients, float32 scalars."""
 
     policy: jax.Array
-    value: jax.Array
     entropy: jax.Array  # nats; the loss falls as it grows
 
 
-def loss_terms(
-    mean: jax.Array,
-    output: jax.Array,
-    samples: Samples,
-    std: jax.Array,
-    weights: jax.Array,
-    clip: float,
-) -> tuple[LossTerms, dict[str, jax.Array]]:
+def actor_terms(
+    mean: jax.Array, samples: Samples, std: jax.Array, weights: jax.Array, clip: float
+) -> tuple[ActorTerms, dict[str, jax.Array]]:
     """The terms on some samples, and what to log of them.
 
     Args:
         mean: [N, A], the actor's on the samples' observations.
-        output: [N, K], the critic's.
         samples: what the old policy did.
         std: [A] of the old and the new policy, or [N, A] of the new one for each sample.
         weights: [K] of the objectives, their sum is 1.
@@ -53,24 +46,22 @@ def loss_terms(
     """
     log_ratio = gaussian.log_prob(samples.action, mean, std) - samples.log_prob
     ratio = jnp.exp(log_ratio)
-    terms = LossTerms(
+    terms = ActorTerms(
         policy=policy_loss(ratio, samples.advantage, weights, clip),
-        value=value_loss(output, samples.target),
         # Constant where the std is a setting: the term then moves the loss, not its gradient.
         entropy=jnp.mean(gaussian.entropy(std)),
     )
     metrics = {
         "loss/policy": terms.policy,
-        "loss/value": terms.value,
         "ppo/clip_fraction": clip_fraction(ratio, clip),
         "ppo/kl": approx_kl(log_ratio),
     }
     return terms, metrics
 
 
-def total_loss(terms: LossTerms, value_coefficient: float, entropy_coefficient: float) -> jax.Array:
-    """policy + value_coefficient * value - entropy_coefficient * entropy."""
-    return terms.policy + value_coefficient * terms.value - entropy_coefficient * terms.entropy
+def actor_loss(terms: ActorTerms, entropy_coefficient: float) -> jax.Array:
+    """policy - entropy_coefficient * entropy."""
+    return terms.policy - entropy_coefficient * terms.entropy
 
 
 def policy_loss(
@@ -99,8 +90,8 @@ def policy_loss(
 def value_loss(output: jax.Array, target: jax.Array) -> jax.Array:
     """Mean squared error over samples and objectives, [N, K] both; without value clipping.
 
-    There is no factor 1/2: the coefficient then means what it does in Stable-Baselines3 (Raffin et
-    al. 2021), with which the get-up paper trained.
+    It has an optimiser of its own, and Adam does not see a loss's scale, so the papers' coefficient
+    of it has nothing to say here.
     """
     return jnp.mean(jnp.square(output - target))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import jax
@@ -27,11 +28,22 @@ class LearnerState:
 
     policy: PolicyState
     critic: Any  # variables of the critic network
-    optimiser: Any  # optax state over the actor and the critic together
+    average: Any  # moving average of the actor's variables: what is evaluated and exported
+    actor_optimiser: Any  # optax state
+    critic_optimiser: Any  # optax state
     popart: PopArt | None  # [K]; None: targets in return units
-    learning_rate_scale: jax.Array  # [] float32, times the scheduled rate
+    learning_rate_scale: jax.Array  # [] float32, times the actor's scheduled rate
     # by motion group; None: no composite motion
     discriminators: dict[str, DiscriminatorState] | None = None
+
+    @property
+    def averaged_policy(self) -> PolicyState:
+        """The policy to evaluate and export: the averaged actor, the newest statistics."""
+        return dataclasses.replace(self.policy, actor=self.average)
+
+    def beginning_with(self, policy: PolicyState) -> LearnerState:
+        """The learner with another policy, which so far is its own average."""
+        return dataclasses.replace(self, policy=policy, average=policy.actor)
 
 
 @struct.dataclass

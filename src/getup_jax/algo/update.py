@@ -12,38 +12,32 @@ import optax
 # (parameters, minibatch) -> (scalar loss, metrics)
 Loss = Callable[[Any, Any], tuple[jax.Array, dict[str, jax.Array]]]
 
-# Adam's epsilon of the PPO implementations; optax's own default is a thousand times smaller.
-ADAM_EPSILON = 1e-5
+# Of the PPO implementations, a thousand times optax's own; small beside the actor's gradients.
+ACTOR_EPSILON = 1e-5
+# The critic's gradients are smaller: beside them 1e-5 would slow what has hardly any left.
+CRITIC_EPSILON = 1e-8
 
-# The rate moves by this factor an iteration, once the clip fraction is that far from its target ...
-SCALE_STEP = 1.2
-CLIP_FRACTION_BAND = 1.25
-# ... and never further from the schedule than this.
-SCALE_RANGE = (0.05, 5.0)
+# The rate starts at this share of the schedule: the first full step of a trained policy with little
+# noise would be too far ...
+FIRST_SCALE = 0.05
+# ... and moves by these factors an iteration, once the clip fraction is that far from its target.
+SCALE_STEPS = ((1.25, 1.2), (2.5, 1.25))  # (distance, factor); beyond both, both
+# It is never above the schedule, which so can end a run with small steps.
+SCALE_RANGE = (1e-3, 1.0)
 
 
 def make_optimiser(
-    max_gradient_norm: float, learning_rate: jax.Array | float, critic_scale: float = 1.0
+    max_gradient_norm: float, learning_rate: jax.Array | float, epsilon: float
 ) -> optax.GradientTransformation:
-    """Adam after clipping the norm of the whole gradient.
+    """Adam after clipping the gradient's norm.
 
-    The rate is an argument of the traced step, so its state has the same form at every rate. With
-    a `critic_scale`, the parameters are (actor, critic), and the critic's rate is that many times
-    as large.
+    The rate is an argument of the traced step, so its state has the same form at every rate.
     """
-    adam = (
+    return optax.chain(
         optax.clip_by_global_norm(max_gradient_norm),
-        optax.scale_by_adam(eps=ADAM_EPSILON),
+        optax.scale_by_adam(eps=epsilon),
         optax.scale(-learning_rate),
     )
-    if critic_scale == 1.0:
-        return optax.chain(*adam)
-    return optax.chain(*adam, optax.stateless(lambda updates, _: _scale(updates, critic_scale)))
-
-
-def _scale(updates: Any, critic_scale: float) -> tuple[Any, Any]:
-    actor, critic = updates
-    return actor, jax.tree.map(lambda x: critic_scale * x, critic)
 
 
 def shuffled_minibatches(
@@ -74,7 +68,8 @@ def run_minibatches(
         minibatches: [U, M] int32, sample numbers of U updates.
 
     Returns:
-        Parameters, optimiser state, and the metrics' means over all updates.
+        Parameters, optimiser state, and the means over all updates of the metrics and of
+        `gradient_norm`, before it was limited.
     """
 
     def minibatch_update(carry: tuple[Any, Any], rows: jax.Array):
@@ -82,7 +77,7 @@ def run_minibatches(
         minibatch = jax.tree.map(lambda x: x[rows], samples)
         gradient, metrics = jax.grad(loss, has_aux=True)(parameters, minibatch)
         updates, optimiser_state = optimiser.update(gradient, optimiser_state, parameters)
-        metrics = {**metrics, "ppo/gradient_norm": optax.tree.norm(gradient)}
+        metrics = {**metrics, "gradient_norm": optax.tree.norm(gradient)}
         return (optax.apply_updates(parameters, updates), optimiser_state), metrics
 
     carry = (parameters, optimiser_state)
@@ -93,11 +88,18 @@ def run_minibatches(
 def adapt_scale(scale: jax.Array, clip_fraction: jax.Array, target: float | None) -> jax.Array:
     """The factor on the next iteration's learning rate, for this iteration's clip fraction.
 
-    Divided by SCALE_STEP above CLIP_FRACTION_BAND * target, multiplied below target /
-    CLIP_FRACTION_BAND, kept in SCALE_RANGE; target None leaves it alone.
+    For each (distance, factor) of SCALE_STEPS it is divided by the factor above distance * target,
+    and multiplied below target / distance; kept in SCALE_RANGE. target None leaves it alone.
     """
     if target is None:
         return scale
-    slower = jnp.where(clip_fraction > CLIP_FRACTION_BAND * target, 1.0 / SCALE_STEP, 1.0)
-    faster = jnp.where(clip_fraction < target / CLIP_FRACTION_BAND, SCALE_STEP, 1.0)
-    return jnp.clip(scale * slower * faster, *SCALE_RANGE)
+    for distance, factor in SCALE_STEPS:
+        slower = jnp.where(clip_fraction > distance * target, 1.0 / factor, 1.0)
+        faster = jnp.where(clip_fraction < target / distance, factor, 1.0)
+        scale = scale * slower * faster
+    return jnp.clip(scale, *SCALE_RANGE)
+
+
+def first_scale(target: float | None) -> jax.Array:
+    """What a fresh learner starts with: FIRST_SCALE where the rate adapts, else 1."""
+    return jnp.asarray(1.0 if target is None else FIRST_SCALE, jnp.float32)

@@ -66,14 +66,10 @@ def score_composite(task: BuiltComposite, episodes: CompositeEpisodes) -> dict[s
     character that stands still in a typical pose has a small error too, where the clips move
     little.
     """
-    rate = 1.0 / task.environment.engine.control_dt
     errors = {}
     for group in task.environment.groups:
-        motion = _seen(group, episodes.position, episodes.quaternion)
-        clips = [resampled(clip, rate) for clip in task.clips[group.name]]
-        references = [_reference(task, group, clip) for clip in clips]
-        found = [imitation_error(motion, reference, loop=True) for reference in references]
-        each = np.stack(found).min(axis=0)
+        motion, references = _compared(task, group, episodes)
+        each = group_errors(motion, references)
         errors[group.name] = {"mean": float(each.mean()), "std": float(each.std())}
         own = np.mean([_speed(reference) for reference in references])
         errors[group.name]["travel"] = float(_speed(motion) / max(own, 1e-9))
@@ -94,6 +90,28 @@ def score_composite(task: BuiltComposite, episodes: CompositeEpisodes) -> dict[s
         "fall_share": float(episodes.fell.any(axis=1).mean()),
         "episodes": len(episodes.fell),
     }
+
+
+def imitation_errors(task: BuiltComposite, episodes: CompositeEpisodes) -> dict[str, np.ndarray]:
+    """Imitation error [N] (m) of every episode, by group."""
+    groups = task.environment.groups
+    return {g.name: group_errors(*_compared(task, g, episodes)) for g in groups}
+
+
+def group_errors(motion: np.ndarray, references: list[np.ndarray]) -> np.ndarray:
+    """Error [N] (m) of motions [N, T, links, 3] to the nearest of the references [S, links, 3]."""
+    found = [imitation_error(motion, reference, loop=True) for reference in references]
+    return np.stack(found).min(axis=0)
+
+
+def _compared(
+    task: BuiltComposite, group: Group, episodes: CompositeEpisodes
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Positions [N, T, links, 3] of a group's links in the episodes, and those of its clips."""
+    motion = _seen(group, episodes.position, episodes.quaternion)
+    rate = 1.0 / task.environment.engine.control_dt
+    clips = [resampled(clip, rate) for clip in task.clips[group.name]]
+    return motion, [_reference(task, group, clip) for clip in clips]
 
 
 def _meta_weights(task: BuiltComposite, episodes: CompositeEpisodes) -> dict[str, Any]:

@@ -31,25 +31,27 @@ class NetworkConfig:
 
 @dataclasses.dataclass(frozen=True)
 class PPOConfig:
-    """PPO-Clip with GAE."""
+    """PPO-Clip with GAE; actor and critic have an optimiser each."""
 
     num_envs: int = 512  # B
     num_steps: int = 64  # T
-    epochs: int = 4
+    epochs: int = 4  # of the actor
+    critic_epochs: int = 4
     minibatch_size: int = 2048
     discount: float = 0.99
     gae_lambda: float = 0.95
     clip: float = 0.2
-    value_coefficient: float = 0.5
     entropy_coefficient: float = 0.0
-    max_gradient_norm: float = 0.5
-    learning_rate: tuple[float, ...] = (1e-4, 2e-5)  # first and last stage
-    critic_rate_scale: float = 1.0  # times the learning rate, for the critic
+    max_gradient_norm: float = 0.5  # of the actor
+    critic_gradient_norm: float = 0.5
+    learning_rate: tuple[float, ...] = (1e-4, 2e-5)  # of the actor, first and last stage
+    critic_learning_rate: tuple[float, ...] = (3e-4, 3e-4)  # first and last stage
     action_std: tuple[float, ...] = (0.6, 0.3)  # first and last stage
     # times the std that the actor gives (network.initial_std), first and last stage
     std_scale: tuple[float, ...] = (1.0, 1.0)
     stages: int = 5  # equal stages of the whole run, for all schedules
-    target_clip_fraction: float | None = None  # adapt the learning rate to it; None: off
+    # adapt the actor's rate to it, below learning_rate; None: off
+    target_clip_fraction: float | None = None
     critic_first: int = 0  # iterations that leave the actor alone, after `train.init_from`
     normalize_observation: bool = True
     popart: bool = False  # normalise the value targets of every objective
@@ -61,9 +63,7 @@ class PPOConfig:
         require(ok, "ppo.minibatch_size", expected, self.minibatch_size)
         require(0 <= self.discount < 1, "ppo.discount", "in [0, 1)", self.discount)
         require(0 <= self.gae_lambda <= 1, "ppo.gae_lambda", "in [0, 1]", self.gae_lambda)
-        scale = self.critic_rate_scale
-        require(scale > 0, "ppo.critic_rate_scale", "more than 0", scale)
-        for name in ("learning_rate", "action_std", "std_scale"):
+        for name in ("learning_rate", "critic_learning_rate", "action_std", "std_scale"):
             ends = getattr(self, name)
             require(len(ends) == 2, f"ppo.{name}", "two values: first and last stage", ends)
         ok = min(self.std_scale) > 0

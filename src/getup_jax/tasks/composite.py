@@ -105,6 +105,11 @@ class CompositeTask:
         first_s = jnp.asarray(self.config.cut_s, jnp.float32) if self.config.cut_grows else None
         return self.start(world, row, key_start).replace(key=key_state, cut_s=first_s)
 
+    def stagger(self, state: CompositeState, key: jax.Array) -> CompositeState:
+        """Episodes [B] as if they had begun at any time before."""
+        last = round(self.config.episode_s / self.engine.control_dt)
+        return state.replace(step=jax.random.randint(key, state.step.shape, 0, last))
+
     def start(self, world: CompositeWorld, row: jax.Array, key: jax.Array) -> CompositeState:
         """Episodes from rows [B] of the start states; the key is for their goals."""
         starts = take(world.starts, row)

@@ -83,6 +83,13 @@ class GetUpTask:
         state = self._begin(world, drawn, levels)
         return state.replace(key=key_state, focus=learned, assist=levels, curriculum=progress)
 
+    def stagger(self, state: EpisodeState, key: jax.Array) -> EpisodeState:
+        """Episodes [B] that are cut at any time; what comes after them runs to its end."""
+        left = state.duration + self.config.stand_time_s - state.time
+        share = jax.random.uniform(key, left.shape)
+        cut = state.time + share * left
+        return state.replace(until=cut if state.until is None else jnp.minimum(state.until, cut))
+
     def step(
         self, world: World, state: EpisodeState, action: jax.Array
     ) -> tuple[EpisodeState, StepOutput]:
@@ -98,7 +105,12 @@ class GetUpTask:
 
         def fresh(index: jax.Array) -> EpisodeState:
             picked = jax.tree.map(lambda x: x[index], drawn)
-            return self._begin(world, picked, levels).replace(key=None)
+            begun = self._begin(world, picked, levels).replace(key=None)
+            if state.until is None or begun.until is not None:
+                return begun
+            return begun.replace(
+                until=jnp.full_like(begun.time, jnp.inf)
+            )  # the first ones were cut
 
         done = output.terminated | output.truncated
         # what belongs to the whole batch has no simulation axis and stays out of the rows
