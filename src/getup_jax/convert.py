@@ -14,6 +14,7 @@ from getup_jax.config import ConfigError
 from getup_jax.config.check import shown
 from getup_jax.config.ranges import check_values, field_types
 
+_LONGEST = 80  # letters that an error text shows of an unknown key
 _EXPECTED = {
     int: "a whole number (int)",
     float: "a number (float)",
@@ -45,7 +46,7 @@ def section(value: Any, cls: type, key: str, default: Any) -> Any:
     for name, item in value.items():
         inner = f"{key}.{name}" if key else str(name)
         if name not in fields:
-            raise ConfigError(f"{inner}: unknown key; {_suggest(name, fields)}")
+            raise ConfigError(f"{_cut(inner)}: unknown key; {_suggest(name, fields)}")
         changed[name] = _convert(item, hints[name], inner, known[name])
     check_values(cls, changed, key)
     values = known | changed
@@ -63,8 +64,12 @@ def _default(field: dataclasses.Field, instance: Any) -> Any:
     return field.default
 
 
+def _cut(name: object) -> str:
+    return str(name)[:_LONGEST]
+
+
 def _suggest(name: object, known: Mapping[str, Any]) -> str:
-    close = difflib.get_close_matches(str(name), known, n=1)
+    close = difflib.get_close_matches(_cut(name), known, n=1)
     return f"did you mean {close[0]!r}?" if close else f"known keys are: {', '.join(known)}"
 
 

@@ -7,9 +7,10 @@ from dataclasses import field
 from typing import Any
 
 from getup_jax.config.check import require
-from getup_jax.config.ranges import MOST_SAMPLES, check_numbers, number
+from getup_jax.config.ranges import MOST_SAMPLES, Range, check, check_numbers, number
 
 FASTEST_TURN = 2.0  # rad/s
+_OF_GOALS = Range(least=-1e6, most=1e6)  # the goals have ranges of their own within it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,6 +121,10 @@ class CompositeConfig:
 
     def __post_init__(self) -> None:
         check_numbers(self, "composite")
+        for goal, settings in self.goals.items():
+            for name, value in (settings or {}).items():
+                for item in value if isinstance(value, list | tuple) else (value,):
+                    check(item, float, _OF_GOALS, f"composite.goals.{goal}.{name}")
         tasks = ("composite", "getup")
         require(self.task in tasks, "composite.task", f"one of {tasks}", self.task)
         if self.task == "getup":

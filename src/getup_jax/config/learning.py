@@ -63,8 +63,8 @@ class PPOConfig:
     def __post_init__(self) -> None:
         check_numbers(self, "ppo")
         batch = self.num_envs * self.num_steps
-        expected = f"num_envs * num_steps of at most {MOST_SAMPLES} samples an iteration"
-        require(batch <= MOST_SAMPLES, "ppo.num_steps", expected, batch)
+        expected = f"at most {MOST_SAMPLES} samples an iteration"
+        require(batch <= MOST_SAMPLES, "ppo.num_envs * ppo.num_steps", expected, batch)
         ok = batch % self.minibatch_size == 0
         expected = f"a divisor of num_envs * num_steps = {batch}"
         require(ok, "ppo.minibatch_size", expected, self.minibatch_size)

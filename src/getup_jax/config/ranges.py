@@ -86,14 +86,21 @@ def range_of(field: dataclasses.Field[Any]) -> Range | None:
 
 def check_numbers(section: Any, key: str) -> None:
     """Raise ConfigError, naming `key`.NAME, for a number of a section that is out of range."""
-    check_values(type(section), {n: getattr(section, n) for n in _ranges(type(section))}, key)
+    check_values(type(section), {n: getattr(section, n) for n in _declared(type(section))}, key)
 
 
 def check_values(cls: type, values: Mapping[str, Any], key: str) -> None:
     """As `check_numbers`, of a section that is not made yet: some of its values by name."""
-    for name, (kind, optional, allowed) in _ranges(cls).items():
-        if name in values and not (optional and values[name] is None):
-            _check(values[name], kind, allowed, f"{key}.{name}" if key else name)
+    for name, declared in _declared(cls).items():
+        if name in values:
+            declared.check(values[name], f"{key}.{name}" if key else name)
+
+
+def check(value: Any, kind: type, allowed: Range, key: str) -> None:
+    """Raise ConfigError unless a number (int or float) is in its range."""
+    real = numbers.Integral if kind is int else numbers.Real
+    if isinstance(value, bool) or not isinstance(value, real) or not allowed.allows(value):
+        raise ConfigError(f"{key}: expected {_WORDS[kind]} {allowed}, got {shown(value)}")
 
 
 @functools.cache
@@ -102,45 +109,56 @@ def field_types(cls: type) -> dict[str, Any]:
     return typing.get_type_hints(cls)
 
 
+@dataclasses.dataclass(frozen=True)
+class _Declared:
+    """A field of numbers: int or float, one or a tuple or dict of them, and their range."""
+
+    kind: type
+    container: type | None  # None: a single number
+    optional: bool
+    allowed: Range
+
+    def check(self, value: Any, key: str) -> None:
+        """Raise ConfigError, naming `key` or an item of it, for a value that does not fit."""
+        if self.optional and value is None:
+            return
+        if self.container is tuple and isinstance(value, list | tuple):
+            _check_length(value, self.allowed, key)
+            items = [(f"{key}[{index}]", item) for index, item in enumerate(value)]
+        elif self.container is dict and isinstance(value, Mapping):
+            items = [(f"{key}.{name}", item) for name, item in value.items()]
+        elif self.container is not None:
+            form = "a list" if self.container is tuple else "a mapping"
+            raise ConfigError(f"{key}: expected {form} of numbers, got {shown(value)}")
+        else:
+            items = [(key, value)]
+        for name, item in items:
+            check(item, self.kind, self.allowed, name)
+
+
 @functools.cache
-def _ranges(cls: type) -> dict[str, tuple[type, bool, Range]]:
-    """By name of each declared number: int or float, whether it may be None, and its range."""
+def _declared(cls: type) -> dict[str, _Declared]:
+    """The fields that were declared with `number`, by name."""
     hints = field_types(cls)
-    declared = ((f.name, range_of(f)) for f in dataclasses.fields(cls))
-    return {name: (*number_kind(hints[name]), allowed) for name, allowed in declared if allowed}
+    ranges = ((f.name, range_of(f)) for f in dataclasses.fields(cls))
+    return {name: _declaration(hints[name], allowed) for name, allowed in ranges if allowed}
 
 
-def number_kind(hint: Any) -> tuple[type, bool]:
-    """int or float, the kind of number in an annotation, and whether it may be None.
-
-    Raises TypeError where it holds none.
-    """
+def _declaration(hint: Any, allowed: Range) -> _Declared:
+    """What an annotation such as `tuple[float, ...] | None` says of its numbers."""
     parts = set(_parts(hint))
-    for kind in (float, int):
-        if kind in parts:
-            return kind, types.NoneType in parts
-    raise TypeError(f"{hint}: has a range, but holds no numbers")
+    kind = next((kind for kind in (float, int) if kind in parts), None)
+    if kind is None:
+        raise TypeError(f"{hint}: has a range, but holds no numbers")
+    origins = {typing.get_origin(part) for part in parts}
+    container = next((origin for origin in (tuple, dict) if origin in origins), None)
+    return _Declared(kind, container, types.NoneType in parts, allowed)
 
 
 def _parts(hint: Any) -> Iterator[Any]:
     yield hint
     for arg in typing.get_args(hint):
         yield from _parts(arg)
-
-
-def _check(value: Any, kind: type, allowed: Range, key: str) -> None:
-    if isinstance(value, list | tuple):
-        _check_length(value, allowed, key)
-        items = [(f"{key}[{index}]", item) for index, item in enumerate(value)]
-    elif isinstance(value, Mapping):
-        items = [(f"{key}.{name}", item) for name, item in value.items()]
-    else:
-        items = [(key, value)]
-    real = numbers.Integral if kind is int else numbers.Real
-    for name, item in items:
-        if isinstance(item, bool) or not isinstance(item, real) or not allowed.allows(item):
-            expected = f"{_WORDS[kind]} {allowed}".strip()
-            raise ConfigError(f"{name}: expected {expected}, got {shown(item)}")
 
 
 def _check_length(value: list[Any] | tuple[Any, ...], allowed: Range, key: str) -> None:
