@@ -127,7 +127,7 @@ def test_a_character_that_plays_the_clips_has_no_error():
         ("terrain={}", r"terrain: expected null with composite motion"),
         ("composite.discriminator.minibatch_size=100", r"minibatch_size: .*a divisor of .*4096"),
         ("composite.groups.upper.frame=rot", r"groups\.\*\.frame: .*'heading', 'root'"),
-        ("composite.groups.upper.history=9", r"groups\.\*\.history: .*0 to 3"),
+        ("composite.groups.upper.history=9", r"groups\.upper\.history: .*from 0 to 3, got 9"),
         ("composite.weights={arms: 0.5}", r"composite\.weights: expected one of each of upper"),
     ],
 )

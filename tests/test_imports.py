@@ -15,7 +15,7 @@ PACKAGE = Path(getup_jax.__file__).parent
 # From left to right; a name is a module or a sub-package of getup_jax.
 LAYERS = [
     ["types", "config", "rotation", "rows"],
-    ["convert", "paths", "settings"],
+    ["convert", "paths", "settings", "yaml_text"],
     ["storage", "manifest", "checkpoint", "metrics", "progress", "journal", "runfolder", "stop"],
     ["physics", "nets", "motion"],
     ["tasks"],
@@ -90,7 +90,8 @@ def test_imports_flow_one_way(path):
 
 
 @pytest.mark.parametrize(
-    "name", ["convert", "settings", "paths", "config", "runfolder", "cli", "eval_options"]
+    "name",
+    ["convert", "settings", "paths", "config", "runfolder", "cli", "eval_options", "yaml_text"],
 )
 def test_what_answers_at_once_imports_nothing_heavy(name):
     files = [path for path in modules() if part_of(path) == name]

@@ -11,7 +11,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from getup_jax.config import ConfigError
+from getup_jax.config.check import shown
+from getup_jax.config.ranges import check_values, field_types
 
+_LONGEST = 80  # letters that an error text shows of an unknown key
 _EXPECTED = {
     int: "a whole number (int)",
     float: "a number (float)",
@@ -28,7 +31,7 @@ class Text:
     value: Any
 
     def __repr__(self) -> str:
-        return repr(self.value)
+        return shown(self.value)
 
 
 def section(value: Any, cls: type, key: str, default: Any) -> Any:
@@ -37,14 +40,15 @@ def section(value: Any, cls: type, key: str, default: Any) -> Any:
     if not isinstance(value, Mapping):
         raise ConfigError(f"{key}: expected a mapping of settings, got {describe(value)}")
     fields = {f.name: f for f in dataclasses.fields(cls)}
-    hints = typing.get_type_hints(cls)
+    hints = field_types(cls)
     known = {name: _default(field, default) for name, field in fields.items()}
     changed = {}
     for name, item in value.items():
         inner = f"{key}.{name}" if key else str(name)
         if name not in fields:
-            raise ConfigError(f"{inner}: unknown key; {_suggest(name, fields)}")
+            raise ConfigError(f"{_cut(inner)}: unknown key; {_suggest(name, fields)}")
         changed[name] = _convert(item, hints[name], inner, known[name])
+    check_values(cls, changed, key)
     values = known | changed
     for name, item in values.items():
         if item is dataclasses.MISSING:
@@ -60,8 +64,12 @@ def _default(field: dataclasses.Field, instance: Any) -> Any:
     return field.default
 
 
+def _cut(name: object) -> str:
+    return str(name)[:_LONGEST]
+
+
 def _suggest(name: object, known: Mapping[str, Any]) -> str:
-    close = difflib.get_close_matches(str(name), known, n=1)
+    close = difflib.get_close_matches(_cut(name), known, n=1)
     return f"did you mean {close[0]!r}?" if close else f"known keys are: {', '.join(known)}"
 
 
@@ -87,10 +95,12 @@ def _convert(value: Any, hint: Any, key: str, default: Any) -> Any:
 
 def _tuple(value: Any, args: tuple[Any, ...], key: str) -> tuple[Any, ...]:
     if not isinstance(value, list | tuple):
-        raise ConfigError(f"{key}: expected a list, got {describe(value)}; write {key}=[{value!r}]")
+        raise ConfigError(
+            f"{key}: expected a list, got {describe(value)}; write {key}=[{shown(value)}]"
+        )
     hints = [args[0]] * len(value) if args[-1] is Ellipsis else list(args)
     if len(value) != len(hints):
-        raise ConfigError(f"{key}: expected {len(hints)} values, got {len(value)}: {value!r}")
+        raise ConfigError(f"{key}: expected {len(hints)} values, got {len(value)}: {shown(value)}")
     pairs = enumerate(zip(value, hints, strict=True))
     return tuple(_convert(item, hint, f"{key}[{i}]", None) for i, (item, hint) in pairs)
 
@@ -115,11 +125,11 @@ def _scalar(value: Any, hint: Any, key: str) -> Any:
 
 def _number(value: Any, kind: type) -> int | float | None:
     """The number, or None where `value` is not one; 1e8 is a whole number too."""
-    if isinstance(value, int) and not isinstance(value, bool):
-        return kind(value)
+    if isinstance(value, int) and not isinstance(value, bool) and kind is int:
+        return value
     try:
         number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
     if kind is int:
         return int(number) if number.is_integer() else None
@@ -129,4 +139,4 @@ def _number(value: Any, kind: type) -> int | float | None:
 def describe(value: Any) -> str:
     """What came, for an error text: the value and its type."""
     value = value.value if isinstance(value, Text) else value
-    return f"{value!r} ({type(value).__name__})"
+    return f"{shown(value)} ({type(value).__name__})"

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from getup_jax import yaml_text
 from getup_jax.config import Config, ConfigError
+from getup_jax.config.check import shown
 from getup_jax.convert import Text, describe, section
 from getup_jax.paths import config_path, shipped_configs
 
@@ -23,6 +25,8 @@ RETIRED = {
     "ppo.critic_rate_scale": "ppo.critic_learning_rate, which does not follow the actor's",
     "ppo.value_coefficient": "nothing: the critic has an optimiser of its own",
 }
+
+_DEEPEST = 10  # names in the key of an override
 
 
 def load_config(path: str | Path | None, overrides: Sequence[str] = ()) -> Config:
@@ -91,29 +95,15 @@ def _plain(value: Any) -> Any:
     return value
 
 
-class _Loader(yaml.SafeLoader):
-    """A safe loader for which a key given twice is an error, not a silent choice."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        """As the parent's, after a check for repeated keys."""
-        seen = set()
-        for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
-            if key.value in seen:
-                problem = f"the key {key.value!r} appears twice"
-                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)
-
-
 def _read_yaml(file: Path) -> dict[str, Any]:
     """The mapping in a YAML file; an empty file is an empty mapping."""
     try:
-        values = yaml.load(file.read_text(encoding="utf-8"), Loader=_Loader)
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else "?"
-        raise ConfigError(f"{file}, line {line}: broken YAML: {error.problem}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{file}: not a YAML text file: {error}") from None
+        values = yaml_text.parse(file.read_bytes())
+    except OSError as error:
+        raise ConfigError(f"{file}: cannot be read: {error.strerror or error}") from None
+    except yaml_text.YamlError as error:
+        place = "" if error.line is None else f", line {error.line}"
+        raise ConfigError(f"{file}{place}: broken YAML: {error}") from None
     if values is None:
         return {}
     if not isinstance(values, dict):
@@ -125,13 +115,12 @@ def _parse_override(override: str) -> dict[str, Any]:
     """`a.b=value` as {a: {b: value}}."""
     key, equals, text = override.partition("=")
     first, *inner = names = key.strip().split(".")
-    if not equals or not all(names):
-        raise ConfigError(f"{override!r}: expected section.key=value, such as ppo.epochs=4")
+    if not equals or not all(names) or len(names) > _DEEPEST:
+        raise ConfigError(f"{shown(override)}: expected section.key=value, such as ppo.epochs=4")
     try:
-        value: Any = yaml.load(text, Loader=_Loader)
-    except yaml.YAMLError as error:
-        problem = getattr(error, "problem", error)
-        raise ConfigError(f"{key}: broken YAML in {text!r}: {problem}") from None
+        value: Any = yaml_text.parse(text)
+    except yaml_text.YamlError as error:
+        raise ConfigError(f"{key}: broken YAML in {shown(text)}: {error}") from None
     if value is not None and not isinstance(value, dict | list):
         value = Text(text, value)
     for name in reversed(inner):

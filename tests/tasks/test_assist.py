@@ -221,7 +221,7 @@ def test_the_hand_needs_the_focus_whose_cells_it_has():
 def test_the_hand_lets_go_after_some_time_and_its_level_moves():
     with pytest.raises(ConfigError, match=r"task\.assist_s: .*more than 0"):
         TaskConfig(assist_s=0.0)
-    with pytest.raises(ConfigError, match=r"task\.assist_rates: .*more than 0"):
+    with pytest.raises(ConfigError, match=r"task\.assist_rates\[1\]: .*more than 0"):
         TaskConfig(assist_rates=(0.02, 0.0))
 
 

@@ -12,6 +12,7 @@ from dataclasses import field
 from getup_jax.config.check import ConfigError, require
 from getup_jax.config.composite import CompositeConfig, DiscriminatorConfig, GroupConfig
 from getup_jax.config.learning import NetworkConfig, PPOConfig, TrainConfig
+from getup_jax.config.ranges import LAST_SEED, check_numbers, number
 from getup_jax.config.simulation import MotionConfig, PhysicsConfig, PriorConfig, TerrainConfig
 from getup_jax.config.task import TaskConfig
 
@@ -36,7 +37,7 @@ __all__ = [
 class Config:
     """One run. `getup-train FILE section.key=value ...` overrides any of it."""
 
-    seed: int = 0
+    seed: int = number(0, least=0, most=LAST_SEED)
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
     # None: no pose prior, the action is the servo target and no offset is unnatural
@@ -54,6 +55,7 @@ class Config:
         return self.composite is not None and self.composite.task == "composite"
 
     def __post_init__(self) -> None:
+        check_numbers(self, "")
         scale, default = self.ppo.std_scale, PPOConfig.std_scale
         ok = scale == default or self.network.initial_std is not None
         expected = f"{default} where network.initial_std is null; ppo.action_std sets the noise"

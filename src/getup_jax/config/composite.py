@@ -7,8 +7,10 @@ from dataclasses import field
 from typing import Any
 
 from getup_jax.config.check import require
+from getup_jax.config.ranges import MOST_SAMPLES, Range, check, check_numbers, number
 
 FASTEST_TURN = 2.0  # rad/s
+_OF_GOALS = Range(least=-1e6, most=1e6)  # the goals have ranges of their own within it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,67 +21,54 @@ class GroupConfig:
     links: tuple[str, ...] = ()
     clips: tuple[str, ...] = ()  # names of authored clips, or motion files
     frame: str = "heading"  # heading: of the newest root | root: the root's own in every frame
-    history: int = 3  # n_i of equation 3; a window has 2 frames more
-    speed: tuple[float, ...] = (1.0, 1.0)  # range of the clips' pace, drawn for each window
+    # n_i of equation 3; a window has 2 frames more, and the actor sees 3
+    history: int = number(3, least=0, most=3)
+    # range of the clips' pace, drawn for each window: slowest, fastest
+    speed: tuple[float, ...] = number((1.0, 1.0), above=0, most=10, length=2)
     # rad/s, positive to the left: each clip is also bent along an arc on which it turns this fast;
     # 0 is the clip as it is
-    turns: tuple[float, ...] = (0.0,)
+    turns: tuple[float, ...] = number(
+        (0.0,), least=-FASTEST_TURN, most=FASTEST_TURN, length=(1, 64)
+    )
 
     def __post_init__(self) -> None:
+        check_numbers(self, "composite.groups.*")
         frames = ("heading", "root")
         require(self.frame in frames, "composite.groups.*.frame", f"one of {frames}", self.frame)
-        ok = 0 <= self.history <= 3
-        require(ok, "composite.groups.*.history", "0 to 3, which the actor sees", self.history)
-        ok = len(self.speed) == 2 and 0 < self.speed[0] <= self.speed[1]
-        require(ok, "composite.groups.*.speed", "0 < slowest <= fastest", self.speed)
-        ok = bool(self.turns) and max(map(abs, self.turns)) <= FASTEST_TURN
-        expected = f"rad/s from -{FASTEST_TURN} to {FASTEST_TURN}, at least one"
-        require(ok, "composite.groups.*.turns", expected, self.turns)
+        slowest, fastest = self.speed
+        ok = slowest <= fastest
+        require(ok, "composite.groups.*.speed", "slowest <= fastest", self.speed)
 
 
 @dataclasses.dataclass(frozen=True)
 class DiscriminatorConfig:
     """One ensemble a group: a GRU over the window, dense layers, many heads [C 4.2]."""
 
-    gru_size: int = 256
-    hidden_sizes: tuple[int, ...] = (256, 128)
-    heads: int = 32  # N of equation 2
-    gradient_penalty: float = 10.0  # lambda of equation 2
+    gru_size: int = number(256, least=1, most=4096)
+    hidden_sizes: tuple[int, ...] = number((256, 128), least=1, most=4096, length=(0, 8))
+    heads: int = number(32, least=1, most=1024)  # N of equation 2
+    gradient_penalty: float = number(10.0, least=0, most=10_000)  # lambda of equation 2
     # whose gradient is held at 1: sum, that of all heads together, as in the authors' release: the
     # mean of N heads then changes by at most 1 / N a unit of distance | head, each, as equation 2
     penalty_of: str = "sum"
     # that norm; less than 1: the score still tells apart what is far from the clips
-    gradient_norm: float = 1.0
-    learning_rate: float = 1e-5
-    minibatch_size: int = 256
-    share: float = 1.0  # of a rollout's windows that an update learns from, drawn at random
+    gradient_norm: float = number(1.0, above=0, most=1000)
+    learning_rate: float = number(1e-5, above=0, most=1)
+    minibatch_size: int = number(256, least=1, most=MOST_SAMPLES)
+    # of a rollout's windows that an update learns from, drawn at random
+    share: float = number(1.0, above=0, most=1)
     # features (m, and numbers of quaternions) that vary by less are not blown up to a std of 1:
     # clips hold many links still, and any noise of the actions would tell the two kinds apart
-    least_std: float = 0.0
+    least_std: float = number(0.0, least=0, most=100)
     # windows of earlier rollouts that are kept, and make up half of the simulated ones; 0: none
-    memory: int = 0
+    memory: int = number(0, least=0, most=1_000_000)
 
     def __post_init__(self) -> None:
-        ok = 0 < self.share <= 1
-        require(ok, "composite.discriminator.share", "more than 0, at most 1", self.share)
-        require(
-            self.memory >= 0,
-            "composite.discriminator.memory",
-            "0, or a number of windows",
-            self.memory,
-        )
-        ok = self.least_std >= 0
-        require(ok, "composite.discriminator.least_std", "at least 0", self.least_std)
-        for name in ("gru_size", "heads", "gradient_norm", "learning_rate", "minibatch_size"):
-            value = getattr(self, name)
-            require(value > 0, f"composite.discriminator.{name}", "more than 0", value)
+        check_numbers(self, "composite.discriminator")
         kinds = ("sum", "head")
         ok = self.penalty_of in kinds
         key = "composite.discriminator.penalty_of"
         require(ok, key, f"one of {kinds}", self.penalty_of)
-        ok = self.gradient_penalty >= 0
-        key = "composite.discriminator.gradient_penalty"
-        require(ok, key, "at least 0", self.gradient_penalty)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,7 +88,7 @@ class CompositeConfig:
     free_links: tuple[str, ...] = ()  # links that need not be in any group
     # goal tasks by name with their settings, such as {target_location: {speed: [1.2, 1.5]}}
     goals: dict[str, dict[str, Any]] = field(default_factory=dict)
-    weights: dict[str, float] = field(default_factory=dict)  # of objectives; empty: all the same
+    weights: dict[str, float] = number({}, least=0, most=1)  # of objectives; empty: all the same
     multi_objective: bool = True  # False: one critic for the weighted sum of all rewards
     discriminator: DiscriminatorConfig = field(default_factory=DiscriminatorConfig)
     meta: str | None = None  # a composite policy whose actions this one weights and adds to [C 5]
@@ -108,46 +97,45 @@ class CompositeConfig:
     meta_sees: str = "all"
     # of the hinges with clips that the meta policy does not know: its share of their targets at
     # first, which falls to 0 while few episodes end in falls; none in evaluations
-    meta_share: float = 0.0
+    meta_share: float = number(0.0, least=0, below=1)
     start_group: str | None = None  # episodes start along its clips; None: the last group's
     start_mixed: bool = False  # and with the other groups' hinges from their own clips
     # before training, the actor learns by regression what comes next in the clips, over a meta
     # policy in those that are new; only where training starts from a fresh policy
     rehearse: bool = False
-    episode_s: float = 10.0
+    episode_s: float = number(10.0, above=0, most=3600)
     # training episodes are cut at random, on average after this long: more samples near the clips,
     # where an episode starts and a policy learns to go on with a motion; None: only at episode_s
-    cut_s: float | None = None
+    cut_s: float | None = number(None, above=0, most=3600)
     cut_grows: bool = False  # from cut_s towards episode_s, while few episodes fail before
-    end_reward: float = -1.0  # of every objective in the step that ends an episode early
-    fall_height_m: float = 0.15  # a joint centre below it, but for the feet's, is a fall
-    action_scale: float = 1.0  # times the range below, moved by an action of 1
+    # of every objective in the step that ends an episode early
+    end_reward: float = number(-1.0, least=-1000, most=1000)
+    # a joint centre below it, but for the feet's, is a fall
+    fall_height_m: float = number(0.15, least=0, most=2)
+    # times the range below, moved by an action of 1
+    action_scale: float = number(1.0, above=0, most=100)
     # range: of a hinge, its whole range | clips: as much as the clips move it, and a little more
     action_range: str = "range"
     # pose of action 0; clips: of each hinge the mean over its group's clips | neutral
     action_centre: str = "clips"
 
     def __post_init__(self) -> None:
+        check_numbers(self, "composite")
+        for goal, settings in self.goals.items():
+            for name, value in (settings or {}).items():
+                for item in value if isinstance(value, list | tuple) else (value,):
+                    check(item, float, _OF_GOALS, f"composite.goals.{goal}.{name}")
         tasks = ("composite", "getup")
         require(self.task in tasks, "composite.task", f"one of {tasks}", self.task)
         if self.task == "getup":
             self._check_getup()
         else:
             require(bool(self.groups), "composite.groups", "at least one group", self.groups)
-        require(self.episode_s > 0, "composite.episode_s", "more than 0", self.episode_s)
         kinds = ("all", "own")
         ok = self.meta_sees in kinds
         require(ok, "composite.meta_sees", f"one of {kinds}", self.meta_sees)
-        ok = 0 <= self.meta_share < 1 and (self.meta_share == 0 or self.meta is not None)
-        expected = "at least 0, less than 1; 0 without composite.meta"
-        require(ok, "composite.meta_share", expected, self.meta_share)
-        require(self.action_scale > 0, "composite.action_scale", "more than 0", self.action_scale)
-        require(
-            self.cut_s is None or self.cut_s > 0,
-            "composite.cut_s",
-            "more than 0, or null",
-            self.cut_s,
-        )
+        ok = self.meta_share == 0 or self.meta is not None
+        require(ok, "composite.meta_share", "0 without composite.meta", self.meta_share)
         ok = not self.cut_grows or self.cut_s is not None
         require(ok, "composite.cut_s", "a first time where composite.cut_grows", self.cut_s)
         centres, centre = ("clips", "neutral"), self.action_centre

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 from getup_jax.config.check import require
+from getup_jax.config.ranges import MOST_SAMPLES, check_numbers, number
 
 
 @dataclasses.dataclass(frozen=True)
 class NetworkConfig:
     """Actor and critic: separate multilayer perceptrons."""
 
-    hidden_sizes: tuple[int, ...] = (256, 256)
+    hidden_sizes: tuple[int, ...] = number((256, 256), least=1, most=4096, length=(0, 8))
     activation: str = "relu"  # relu | tanh | elu | silu | relu6
-    gru_size: int = 256  # GRU in front of both, where the task observes a history of frames
+    # GRU in front of both, where the task observes a history of frames
+    gru_size: int = number(256, least=1, most=4096)
     # first std of actions that the actor gives for each state; None: ppo.action_std for all
-    initial_std: float | None = None
-    std_range: float = 2.0  # how far the actor may move it either way, in e-folds
+    initial_std: float | None = number(None, above=0, most=10)
+    # how far the actor may move it either way, in e-folds
+    std_range: float = number(2.0, least=0, most=10)
 
     def __post_init__(self) -> None:
-        require(self.gru_size > 0, "network.gru_size", "more than 0", self.gru_size)
-        std = self.initial_std
-        require(std is None or std > 0, "network.initial_std", "more than 0, or null", std)
-        ok = self.std_range >= 0
-        require(ok, "network.std_range", "at least 0", self.std_range)
+        check_numbers(self, "network")
         names = ("relu", "tanh", "elu", "silu", "relu6")
         ok = self.activation in names
         require(ok, "network.activation", f"one of {names}", self.activation)
@@ -33,51 +33,53 @@ class NetworkConfig:
 class PPOConfig:
     """PPO-Clip with GAE; actor and critic have an optimiser each."""
 
-    num_envs: int = 512  # B
-    num_steps: int = 64  # T
-    epochs: int = 4  # of the actor
-    critic_epochs: int = 4
-    minibatch_size: int = 2048
-    discount: float = 0.99
-    gae_lambda: float = 0.95
-    clip: float = 0.2
-    entropy_coefficient: float = 0.0
-    max_gradient_norm: float = 0.5  # of the actor
-    critic_gradient_norm: float = 0.5
-    learning_rate: tuple[float, ...] = (1e-4, 2e-5)  # of the actor, first and last stage
-    critic_learning_rate: tuple[float, ...] = (3e-4, 3e-4)  # first and last stage
-    action_std: tuple[float, ...] = (0.6, 0.3)  # first and last stage
+    num_envs: int = number(512, least=1, most=131_072)  # B
+    num_steps: int = number(64, least=1, most=65_536)  # T
+    epochs: int = number(4, least=1, most=1000)  # of the actor
+    critic_epochs: int = number(4, least=1, most=1000)
+    minibatch_size: int = number(2048, least=1, most=MOST_SAMPLES)
+    discount: float = number(0.99, least=0, below=1)
+    gae_lambda: float = number(0.95, least=0, most=1)
+    clip: float = number(0.2, above=0, most=10)
+    entropy_coefficient: float = number(0.0, least=0, most=10)
+    max_gradient_norm: float = number(0.5, above=0, most=1e6)  # of the actor
+    critic_gradient_norm: float = number(0.5, above=0, most=1e6)
+    # of the actor, first and last stage
+    learning_rate: tuple[float, ...] = number((1e-4, 2e-5), least=0, most=1, length=2)
+    # first and last stage
+    critic_learning_rate: tuple[float, ...] = number((3e-4, 3e-4), least=0, most=1, length=2)
+    # first and last stage
+    action_std: tuple[float, ...] = number((0.6, 0.3), above=0, most=10, length=2)
     # times the std that the actor gives (network.initial_std), first and last stage
-    std_scale: tuple[float, ...] = (1.0, 1.0)
-    stages: int = 5  # equal stages of the whole run, for all schedules
+    std_scale: tuple[float, ...] = number((1.0, 1.0), above=0, most=10, length=2)
+    # equal stages of the whole run, for all schedules
+    stages: int = number(5, least=1, most=10_000)
     # adapt the actor's rate to it, below learning_rate; None: off
-    target_clip_fraction: float | None = None
-    critic_first: int = 0  # iterations that leave the actor alone, after `train.init_from`
+    target_clip_fraction: float | None = number(None, above=0, below=1)
+    # iterations that leave the actor alone, after `train.init_from`
+    critic_first: int = number(0, least=0, most=1_000_000)
     normalize_observation: bool = True
     popart: bool = False  # normalise the value targets of every objective
 
     def __post_init__(self) -> None:
+        check_numbers(self, "ppo")
         batch = self.num_envs * self.num_steps
+        expected = f"at most {MOST_SAMPLES} samples an iteration"
+        require(batch <= MOST_SAMPLES, "ppo.num_envs * ppo.num_steps", expected, batch)
         ok = batch % self.minibatch_size == 0
         expected = f"a divisor of num_envs * num_steps = {batch}"
         require(ok, "ppo.minibatch_size", expected, self.minibatch_size)
-        require(0 <= self.discount < 1, "ppo.discount", "in [0, 1)", self.discount)
-        require(0 <= self.gae_lambda <= 1, "ppo.gae_lambda", "in [0, 1]", self.gae_lambda)
-        for name in ("learning_rate", "critic_learning_rate", "action_std", "std_scale"):
-            ends = getattr(self, name)
-            require(len(ends) == 2, f"ppo.{name}", "two values: first and last stage", ends)
-        ok = min(self.std_scale) > 0
-        require(ok, "ppo.std_scale", "two values of more than 0", self.std_scale)
 
 
 @dataclasses.dataclass(frozen=True)
 class TrainConfig:
     """The run: length, where it writes, how often it logs and saves."""
 
-    total_steps: int = 100_000_000  # control steps (samples) of the whole run
-    log_every: int = 1  # iterations between log lines
-    save_every_s: float = 300.0  # wall time between checkpoints
-    keep: int = 2  # learner checkpoints kept
+    # control steps (samples) of the whole run
+    total_steps: int = number(100_000_000, least=1, most=10**15)
+    log_every: int = number(1, least=1, most=1_000_000)  # iterations between log lines
+    save_every_s: float = number(300.0, least=0, most=math.inf)  # wall time between checkpoints
+    keep: int = number(2, least=1, most=1_000_000)  # learner checkpoints kept
     tensorboard: bool = False  # extra: tensorboard
     init_from: str | None = None  # a checkpoint whose policy starts the run
     # also its critic, optimiser, curriculum and which starts are learned: the same task goes on
@@ -85,7 +87,6 @@ class TrainConfig:
     init_learner: bool = False
 
     def __post_init__(self) -> None:
-        require(self.total_steps > 0, "train.total_steps", "more than 0", self.total_steps)
-        require(self.keep >= 1, "train.keep", "at least 1", self.keep)
+        check_numbers(self, "train")
         ok = self.init_from is not None or not self.init_learner
         require(ok, "train.init_learner", "train.init_from, whose learner it means", "none")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 from getup_jax.config.check import require
+from getup_jax.config.ranges import LAST_SEED, MOST_COUNT, check_numbers, number
 
 
 @dataclasses.dataclass(frozen=True)
@@ -13,17 +15,22 @@ class PhysicsConfig:
 
     engine: str = "auto"  # auto | native | mjx | mjx-warp; auto: the fastest here
     character: str = "humanoid49"  # assets/NAME.xml, or a path to an MJCF file
-    control_hz: int = 30  # policy rate
-    substeps: int = 2  # physics steps in one control period
+    control_hz: int = number(30, least=1, most=1000)  # policy rate
+    substeps: int = number(2, least=1, most=1000)  # physics steps in one control period
     solver: str = "auto"  # newton | cg | pgs; auto: pgs on native, newton on MJX, which has no pgs
-    iterations: int = 10  # solver iterations at most
-    gain_scale: float = 1.5  # times the stiffness and damping of the MJCF file
-    torque_scale: float = 1.0  # times the torque limits of the MJCF file
-    armature: float = 0.1  # kg m^2, added to every hinge
-    damping: float = 1.0  # Nms/rad of every hinge; all that a servo at its torque limit has
-    threads: int = 0  # native: worker threads; 0: every CPU this process may use
+    iterations: int = number(10, least=1, most=1000)  # solver iterations at most
+    # times the stiffness and damping of the MJCF file
+    gain_scale: float = number(1.5, above=0, most=100)
+    # times the torque limits of the MJCF file
+    torque_scale: float = number(1.0, above=0, most=1000)
+    armature: float = number(0.1, least=0, most=100)  # kg m^2, added to every hinge
+    # Nms/rad of every hinge; all that a servo at its torque limit has
+    damping: float = number(1.0, least=0, most=1000)
+    # native: worker threads; 0: every CPU this process may use
+    threads: int = number(0, least=0, most=1024)
 
     def __post_init__(self) -> None:
+        check_numbers(self, "physics")
         engines = ("auto", "native", "mjx", "mjx-warp")
         require(self.engine in engines, "physics.engine", f"one of {engines}", self.engine)
         solvers = ("auto", "newton", "cg", "pgs")
@@ -31,11 +38,6 @@ class PhysicsConfig:
         mjx_pgs = self.engine.startswith("mjx") and self.solver == "pgs"
         expected = "auto, newton or cg, since MJX has no PGS"
         require(not mjx_pgs, "physics.solver", expected, self.solver)
-        for name in ("control_hz", "substeps", "iterations", "gain_scale", "torque_scale"):
-            require(getattr(self, name) > 0, f"physics.{name}", "more than 0", getattr(self, name))
-        for name in ("armature", "damping"):
-            require(getattr(self, name) >= 0, f"physics.{name}", "at least 0", getattr(self, name))
-        require(self.threads >= 0, "physics.threads", "at least 0", self.threads)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,48 +47,42 @@ class TerrainConfig:
     Half of each irregular region is rough, and half has even slopes in all directions.
     """
 
-    seed: int = 0  # another seed is another ground of the same kind
-    region_size_m: float = 48.0  # side of a region, a square
-    border_m: float = 4.0  # flat ground around the regions
-    grid_step_m: float = 0.5  # between two heights of the field
-    tile_m: float = 1.0  # side of a tile of the rough ground
-    rough_m: tuple[float, ...] = (0.06, 0.13, 0.2)  # its corners move up or down by at most this
-    slope_deg: tuple[float, ...] = (10.0, 20.0, 30.0)  # steepest slope of easy, medium, hard
-    slope_block_m: float = 12.0  # diameter of a hill or hollow
+    # another seed is another ground of the same kind
+    seed: int = number(0, least=0, most=LAST_SEED)
+    region_size_m: float = number(48.0, above=0, most=500)  # side of a region, a square
+    border_m: float = number(4.0, least=2, most=100)  # flat ground around the regions
+    # between two heights of the field; collisions with a finer one are slow
+    grid_step_m: float = number(0.5, least=0.5, most=10)
+    tile_m: float = number(1.0, above=0, most=100)  # side of a tile of the rough ground
+    # its corners move up or down by at most this
+    rough_m: tuple[float, ...] = number((0.06, 0.13, 0.2), least=0, most=2, length=3)
+    # steepest slope of easy, medium, hard
+    slope_deg: tuple[float, ...] = number((10.0, 20.0, 30.0), least=0, most=60, length=3)
+    # diameter of a hill or hollow: a lying body has room on one slope
+    slope_block_m: float = number(12.0, least=8, most=100)
     # times the differences within the height map that the policy sees: a body's height over the
     # ground varies by .35 m (std), the ground below it on a slope of 10 degrees by .05 m
-    relief_gain: float = 4.0
-    drops: int = 5000  # rag-dolls dropped on the irregular regions for lying starts
+    relief_gain: float = number(4.0, above=0, most=100)
+    # rag-dolls dropped on the irregular regions for lying starts
+    drops: int = number(5000, least=1, most=1_000_000)
     curriculum: str = "success"  # what opens the next region: success | schedule | none (all open)
-    unlock_successes: int = 200  # success: this many in the newest region
-    schedule_steps: int = 20_000_000  # schedule: control steps a region
+    # success: this many in the newest region
+    unlock_successes: int = number(200, least=1, most=MOST_COUNT)
+    # schedule: control steps a region
+    schedule_steps: int = number(20_000_000, least=1, most=MOST_COUNT)
 
     def __post_init__(self) -> None:
-        for name in ("region_size_m", "grid_step_m", "tile_m", "slope_block_m"):
-            require(getattr(self, name) > 0, f"terrain.{name}", "more than 0", getattr(self, name))
-        for name in ("unlock_successes", "schedule_steps", "drops"):
-            require(getattr(self, name) > 0, f"terrain.{name}", "more than 0", getattr(self, name))
+        check_numbers(self, "terrain")
         for name in ("rough_m", "slope_deg"):
-            values = getattr(self, name)
-            ok = len(values) == 3 and 0 <= values[0] <= values[1] <= values[2]
-            expected = "three values of at least 0 that do not fall: easy, medium, hard"
-            require(ok, f"terrain.{name}", expected, values)
-        ok = max(self.slope_deg) <= 60
-        require(ok, "terrain.slope_deg", "at most 60 degrees", self.slope_deg)
-        require(self.relief_gain > 0, "terrain.relief_gain", "more than 0", self.relief_gain)
+            easy, medium, hard = values = getattr(self, name)
+            expected = "three values that do not fall: easy, medium, hard"
+            require(easy <= medium <= hard, f"terrain.{name}", expected, values)
         kinds = ("success", "schedule", "none")
         ok = self.curriculum in kinds
         require(ok, "terrain.curriculum", f"one of {kinds}", self.curriculum)
         self._check_sizes()
 
     def _check_sizes(self) -> None:
-        require(self.border_m >= 2, "terrain.border_m", "at least 2 m", self.border_m)
-        ok = self.grid_step_m >= 0.5
-        expected = "at least 0.5 m, since collisions with a finer field are slow"
-        require(ok, "terrain.grid_step_m", expected, self.grid_step_m)
-        ok = self.slope_block_m >= 8
-        expected = "at least 8 m, so that a lying body has room on one slope"
-        require(ok, "terrain.slope_block_m", expected, self.slope_block_m)
         ok = self.region_size_m >= 2 * self.slope_block_m
         expected = f"at least 2 x terrain.slope_block_m = {2 * self.slope_block_m:g} m"
         require(ok, "terrain.region_size_m", expected, self.region_size_m)
@@ -113,8 +109,13 @@ class MotionConfig:
     source: tuple[str, ...] = ("authored",)  # `authored`, `deepmimic`, folders or files
     curves: tuple[str, ...] = ()  # names of the get-ups to train on; empty: all that are found
     mirror: bool = True  # double the pose data by mirroring
-    augment_poses: int = 20_000  # poses that the authored motions are varied into for the prior
-    augment_noise_rad: float = 0.05  # standard deviation of the joint noise in them
+    # poses that the authored motions are varied into for the prior
+    augment_poses: int = number(20_000, least=0, most=1_000_000)
+    # standard deviation of the joint noise in them
+    augment_noise_rad: float = number(0.05, least=0, most=math.pi)
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "motion")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -122,23 +123,22 @@ class PriorConfig:
     """The conditional pose VAE."""
 
     conditional: bool = True  # False: the standard pose VAE, for the ablation
-    latent_size: int = 16
-    hidden_sizes: tuple[int, ...] = (256, 256)
-    beta: float = 1e-6  # weight of the KL term
-    learning_rate: float = 1e-4
-    last_rate: float = 1.0  # share of it at the end, reached along a half cosine; 1: constant
-    weight_decay: float = 0.0  # AdamW's, decoupled from the gradient; 0: Adam
-    input_noise: float = 0.0  # on the encoder's input, in standard deviations of each hinge
-    epochs: int = 100
-    batch_size: int = 128
-    min_updates: int = 20_000  # small pose sets get more epochs, until this many updates
-    holdout: float = 0.1  # share of the poses kept for the report
-    seed: int = 0
+    latent_size: int = number(16, least=1, most=1024)
+    hidden_sizes: tuple[int, ...] = number((256, 256), least=1, most=4096, length=(0, 8))
+    beta: float = number(1e-6, least=0, most=1000)  # weight of the KL term
+    learning_rate: float = number(1e-4, above=0, most=1)
+    # share of it at the end, reached along a half cosine; 1: constant
+    last_rate: float = number(1.0, least=0, most=1)
+    # AdamW's, decoupled from the gradient; 0: Adam
+    weight_decay: float = number(0.0, least=0, most=10)
+    # on the encoder's input, in standard deviations of each hinge
+    input_noise: float = number(0.0, least=0, most=10)
+    epochs: int = number(100, least=1, most=1_000_000)
+    batch_size: int = number(128, least=1, most=1_000_000)
+    # small pose sets get more epochs, until this many updates
+    min_updates: int = number(20_000, least=0, most=100_000_000)
+    holdout: float = number(0.1, above=0, below=1)  # share of the poses kept for the report
+    seed: int = number(0, least=0, most=LAST_SEED)
 
     def __post_init__(self) -> None:
-        require(0 < self.holdout < 1, "prior.holdout", "between 0 and 1", self.holdout)
-        require(0 <= self.last_rate <= 1, "prior.last_rate", "between 0 and 1", self.last_rate)
-        for name in ("weight_decay", "input_noise"):
-            require(getattr(self, name) >= 0, f"prior.{name}", "at least 0", getattr(self, name))
-        for name in ("latent_size", "learning_rate", "epochs", "batch_size"):
-            require(getattr(self, name) > 0, f"prior.{name}", "more than 0", getattr(self, name))
+        check_numbers(self, "prior")

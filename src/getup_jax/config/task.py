@@ -6,65 +6,67 @@ import dataclasses
 import math
 
 from getup_jax.config.check import require
+from getup_jax.config.ranges import check_numbers, number
 
 
 @dataclasses.dataclass(frozen=True)
 class TaskConfig:
     """The get-up task: episodes, starts, early ends and the action."""
 
-    stand_time_s: float = 3.0  # standing phase after the curve's end
-    lookahead_s: tuple[float, ...] = (0.0, 0.1, 0.2, 0.3)  # when the curve targets are seen
-    filter: float = 0.2  # share of the new action in the filtered one
-    offset_scale: float = 1.0  # rad, PD offset of a filtered action of 1
-    offset_limit_rad: float = 10.0  # c of the naturalness reward (equation 3)
-    target_margin_rad: float = 0.5  # how far past a joint limit a PD target may lie
-    terminate_reward: float = 0.1  # early end below this task reward ...
-    terminate_after_s: float = 0.3  # ... or with the head on the floor, for this long
-    head_clearance_m: float = 0.02  # the head is on the floor below this gap
+    stand_time_s: float = number(3.0, above=0, most=3600)  # standing phase after the curve's end
+    # when the curve targets are seen
+    lookahead_s: tuple[float, ...] = number((0.0, 0.1, 0.2, 0.3), least=0, most=60, length=(1, 32))
+    filter: float = number(0.2, above=0, most=1)  # share of the new action in the filtered one
+    offset_scale: float = number(1.0, least=0, most=10)  # rad, PD offset of a filtered action of 1
+    # c of the naturalness reward (equation 3)
+    offset_limit_rad: float = number(10.0, above=0, most=1000)
+    # how far past a joint limit a PD target may lie
+    target_margin_rad: float = number(0.5, least=0, most=10)
+    terminate_reward: float = number(0.1, least=0, most=1)  # early end below this task reward ...
+    # ... or with the head on the floor, for this long
+    terminate_after_s: float = number(0.3, least=0, most=3600)
+    # the head is on the floor below this gap
+    head_clearance_m: float = number(0.02, least=0, most=1)
     # while training: for this long a head that is on the floor for too long only costs the reward;
     # limp bodies that came to rest face down must learn to raise it
-    head_grace_s: float = 0.0
-    stand_start: float = 0.3  # share of episodes that start standing
-    clip_start: float = 0.0  # share that starts along the reference clip, or one that fits
+    head_grace_s: float = number(0.0, least=0, most=3600)
+    stand_start: float = number(0.3, least=0, most=1)  # share of episodes that start standing
+    # share that starts along the reference clip, or one that fits
+    clip_start: float = number(0.0, least=0, most=1)
     # on irregular ground too, turned towards its slope and set down on it
     clip_everywhere: bool = False
     # folder of getup-search, or `authored`, the shipped one; clip starts, if any, are at its states
     paths: str | None = None
-    path_share: float = 0.6  # share of the clip starts that are, where there are states
-    short_share: float = 0.0  # share of the lying and clip starts whose episodes are cut short ...
-    short_s: float = 1.5  # ... after this long: more tries of what comes next for the same steps
-    assist: float = (
-        0.0  # share of the weight that a helping hand lifts at most, until starts succeed
-    )
-    assist_s: float = math.inf  # it lets go so long after the start, in any case
-    assist_rates: tuple[float, float] = (0.02, 0.01)  # less of it for a success, more for a failure
-    assist_share: float = 0.5  # share of the lying and clip starts with the hand; needs focus
-    curve_match_rad: float = 0.52  # largest gap between a curve's and a pose's torso angles
+    # share of the clip starts that are, where there are states
+    path_share: float = number(0.6, least=0, most=1)
+    # share of the lying and clip starts whose episodes are cut short ...
+    short_share: float = number(0.0, least=0, below=1)
+    # ... after this long: more tries of what comes next for the same steps
+    short_s: float = number(1.5, above=0, most=3600)
+    # share of the weight that a helping hand lifts at most, until starts succeed
+    assist: float = number(0.0, least=0, most=10)
+    # it lets go so long after the start, in any case
+    assist_s: float = number(math.inf, above=0, most=math.inf)
+    # less of it for a success, more for a failure
+    assist_rates: tuple[float, float] = number((0.02, 0.01), above=0, most=1, length=2)
+    # share of the lying and clip starts with the hand; needs focus
+    assist_share: float = number(0.5, least=0, below=1)
+    # largest gap between a curve's and a pose's torso angles
+    curve_match_rad: float = number(0.52, least=0, most=math.pi)
     # 0: starts are drawn evenly; towards 1: at the frontier of what is learned, and on irregular
     # ground in regions where more fails
-    focus: float = 0.0
+    focus: float = number(0.0, least=0, below=1)
     focus_even: bool = False  # as often for a style with one part at the frontier as with ten
-    start_noise_rad: float = 0.0  # joint noise of the start poses
-    pool_size: int = 2048  # start states made once
-    settle_s: float = 0.5  # lying starts rest this long before the pool keeps them
+    start_noise_rad: float = number(0.0, least=0, most=math.pi)  # joint noise of the start poses
+    pool_size: int = number(2048, least=1, most=1_000_000)  # start states made once
+    # lying starts rest this long before the pool keeps them
+    settle_s: float = number(0.5, least=0, most=3600)
 
     def __post_init__(self) -> None:
+        check_numbers(self, "task")
         share = self.stand_start + self.clip_start
-        require(0 <= share <= 1, "task.stand_start + task.clip_start", "between 0 and 1", share)
-        require(0 <= self.focus < 1, "task.focus", "at least 0 and less than 1", self.focus)
-        require(0 <= self.short_share < 1, "task.short_share", "0 to below 1", self.short_share)
-        require(self.assist >= 0, "task.assist", "at least 0", self.assist)
-        ok = min(self.assist_rates) > 0
-        require(ok, "task.assist_rates", "two numbers more than 0", self.assist_rates)
-        require(self.assist_s > 0, "task.assist_s", "more than 0", self.assist_s)
+        require(share <= 1, "task.stand_start + task.clip_start", "at most 1", share)
         ok = self.assist == 0 or self.focus > 0
         require(ok, "task.focus", "more than 0 where task.assist is", self.focus)
-        ok = 0 <= self.assist_share < 1
-        require(ok, "task.assist_share", "at least 0 and less than 1", self.assist_share)
-        require(self.head_grace_s >= 0, "task.head_grace_s", "at least 0", self.head_grace_s)
-        require(self.short_s > 0, "task.short_s", "more than 0", self.short_s)
-        require(0 <= self.path_share <= 1, "task.path_share", "between 0 and 1", self.path_share)
-        require(0 < self.filter <= 1, "task.filter", "more than 0 and at most 1", self.filter)
         now = self.lookahead_s[:1] == (0.0,)
         require(now, "task.lookahead_s", "times that start with 0, the present", self.lookahead_s)
-        require(self.pool_size > 0, "task.pool_size", "more than 0", self.pool_size)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any, ClassVar
 
 import jax
@@ -10,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
+from getup_jax.config.ranges import number
 from getup_jax.physics.props import Ball
 from getup_jax.tasks.goals.goal import (
     HELD_S,
@@ -43,9 +45,11 @@ class Aiming:
     control_dt: float
     forearm: int  # link index
     hand: int  # link index
-    yaw: float = 0.8  # rad, the largest angle of a new direction to the character's heading
-    pitch: tuple[float, float] = (-0.3, 0.4)  # rad above the horizontal
-    time: tuple[float, float] = (2.0, 4.0)  # s between changes
+    # rad, the largest angle of a new direction to the character's heading
+    yaw: float = number(0.8, least=0, most=math.pi)
+    # rad above the horizontal
+    pitch: tuple[float, float] = number((-0.3, 0.4), least=-math.pi / 2, most=math.pi / 2, length=2)
+    time: tuple[float, float] = number((2.0, 4.0), above=0, most=600, length=2)  # s between changes
 
     name: ClassVar[str] = "aiming"
     links: ClassVar[dict[str, str]] = {"forearm": "forearm_r", "hand": "hand_r"}

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.config import ConfigError
+from getup_jax.config.ranges import check_values
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.props import Ball, Equipment
 from getup_jax.tasks.goals.aiming import Aiming
@@ -151,25 +152,26 @@ def _make(
     check_name(name, tuple(GOALS), "composite.goals")
     goal = GOALS[name]
     fields = {f.name: f for f in dataclasses.fields(goal) if f.default is not dataclasses.MISSING}
-    arguments = {}
+    given = {}
     for setting, value in (values or {}).items():
         check_name(setting, tuple(fields), key)
-        arguments[setting] = _converted(value, fields[setting].default, f"{key}.{setting}")
+        given[setting] = _rising(value, fields[setting].default, f"{key}.{setting}")
+    check_values(goal, given, key)
+    arguments = {setting: type(fields[setting].default)(v) for setting, v in given.items()}
     wanted: Mapping[str, str] = getattr(goal, "links", {})
     links = {field: character.link(link) for field, link in wanted.items()}
     return goal(control_dt=control_dt, **links, **arguments)
 
 
-def _converted(value: Any, default: Any, key: str) -> Any:
-    """A number, or as many numbers in rising order as the default has."""
+def _rising(value: Any, default: Any, key: str) -> Any:
+    """A number, or a tuple of as many numbers in rising order as the default has."""
     count = len(default) if isinstance(default, tuple) else 1
     numbers = list(value) if isinstance(value, list | tuple) else [value]
     numeric = all(isinstance(n, int | float) and not isinstance(n, bool) for n in numbers)
     if not numeric or len(numbers) != count or sorted(numbers) != numbers:
         expected = f"{count} rising numbers" if count > 1 else "a number"
         raise ConfigError(f"{key}: expected {expected} such as {default}, got {value!r}")
-    made = [type(n)(v) for n, v in zip(default if count > 1 else [default], numbers, strict=True)]
-    return tuple(made) if count > 1 else made[0]
+    return tuple(numbers) if count > 1 else numbers[0]
 
 
 def check_name(name: str, known: tuple[str, ...], key: str) -> None:

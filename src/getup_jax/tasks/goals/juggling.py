@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
+from getup_jax.config.ranges import number
 from getup_jax.physics.props import Ball
 from getup_jax.tasks.goals.flight import descent, flown, throw
 from getup_jax.tasks.goals.goal import GoalOutput, Marker, heading_frame
@@ -44,10 +45,12 @@ class Juggling:
     control_dt: float
     left: int  # link index of the left hand
     right: int
-    interval: int = 20  # control steps between two releases of the same hand
-    catch_m: float = 0.12  # a ball as near to its hand is caught
-    drop_m: float = 0.3  # a ball as low is lost, which ends the episode
-    first_throw_s: float = 0.5  # flight of the third ball, which is in the air at the start
+    # control steps between two releases of the same hand
+    interval: int = number(20, least=2, most=1000)
+    catch_m: float = number(0.12, above=0, most=2)  # a ball as near to its hand is caught
+    drop_m: float = number(0.3, least=0, most=2)  # a ball as low is lost, which ends the episode
+    # flight of the third ball, which is in the air at the start
+    first_throw_s: float = number(0.5, above=0, most=10)
 
     name: ClassVar[str] = "juggling"
     links: ClassVar[dict[str, str]] = {"left": "hand_l", "right": "hand_r"}

@@ -6,6 +6,7 @@ The paper's appendix with the details is not public; this follows its target loc
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any, ClassVar
 
 import jax
@@ -13,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
+from getup_jax.config.ranges import number
 from getup_jax.physics.props import Ball
 from getup_jax.tasks.goals.goal import (
     HELD_S,
@@ -45,9 +47,11 @@ class TargetHeading:
     """Settings of the goal."""
 
     control_dt: float
-    speed: tuple[float, float] = (1.2, 1.5)  # m/s, range that targets are drawn from
-    time: tuple[float, float] = (3.0, 5.0)  # s between changes
-    turn: float = 2.0  # rad, the largest turn of a new direction off the character's heading
+    # m/s, range that targets are drawn from
+    speed: tuple[float, float] = number((1.2, 1.5), least=0, most=20, length=2)
+    time: tuple[float, float] = number((3.0, 5.0), above=0, most=600, length=2)  # s between changes
+    # rad, the largest turn of a new direction off the character's heading
+    turn: float = number(2.0, least=0, most=math.pi)
 
     name: ClassVar[str] = "target_heading"
     observation_size: ClassVar[int] = 3

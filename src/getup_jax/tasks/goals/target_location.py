@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any, ClassVar
 
 import jax
@@ -10,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
+from getup_jax.config.ranges import number
 from getup_jax.physics.props import Ball
 from getup_jax.tasks.goals.goal import (
     HELD_S,
@@ -44,11 +46,15 @@ class TargetLocation:
     """Settings of the goal."""
 
     control_dt: float
-    speed: tuple[float, float] = (1.2, 1.5)  # m/s; walking. Running: 2, 4
-    time: tuple[float, float] = (3.0, 5.0)  # s to get there; the distance is a drawn speed times it
-    slack: float = 1.0  # the time is so many times what the distance takes at the drawn speed
-    turn: float = 3.141592653589793  # rad, the largest angle between the heading and the target
-    radius_m: float = 0.5  # within it the target is reached
+    # m/s; walking. Running: 2, 4
+    speed: tuple[float, float] = number((1.2, 1.5), above=0, most=20, length=2)
+    # s to get there; the distance is a drawn speed times it
+    time: tuple[float, float] = number((3.0, 5.0), above=0, most=600, length=2)
+    # the time is so many times what the distance takes at the drawn speed
+    slack: float = number(1.0, above=0, most=100)
+    # rad, the largest angle between the heading and the target
+    turn: float = number(math.pi, least=0, most=math.pi)
+    radius_m: float = number(0.5, above=0, most=100)  # within it the target is reached
 
     name: ClassVar[str] = "target_location"
     observation_size: ClassVar[int] = 4

@@ -16,6 +16,7 @@ import numpy as np
 from flax import struct
 
 from getup_jax import rotation
+from getup_jax.config.ranges import number
 from getup_jax.physics.props import RACKET_CENTRE_M, Ball
 from getup_jax.tasks.goals.flight import kick, landing, throw
 from getup_jax.tasks.goals.goal import (
@@ -55,16 +56,18 @@ class TennisSwing:
 
     control_dt: float
     hand: int  # link index
-    period: tuple[float, float] = (2.0, 2.5)  # s between balls
-    flight_s: float = 0.9  # from the launch to the character
-    from_m: float = 4.0  # how far in front of the character balls start
-    forward: tuple[float, float] = (0.2, 0.6)  # m from the root, where they come to
-    right: tuple[float, float] = (0.6, 1.0)  # m
-    height: tuple[float, float] = (0.7, 1.1)  # m
-    speed_mps: float = 10.0  # outgoing speed that earns all
-    depth_m: float = 9.0  # in front of the character, where balls should land
-    width_m: float = 2.0  # to either side of it
-    spread_m: float = 4.0  # miss that costs a factor of e
+    period: tuple[float, float] = number((2.0, 2.5), above=0, most=600, length=2)  # s between balls
+    flight_s: float = number(0.9, above=0, most=10)  # from the launch to the character
+    from_m: float = number(4.0, above=0, most=100)  # how far in front of the character balls start
+    # m from the root, where they come to
+    forward: tuple[float, float] = number((0.2, 0.6), least=-10, most=10, length=2)
+    right: tuple[float, float] = number((0.6, 1.0), least=-10, most=10, length=2)  # m
+    height: tuple[float, float] = number((0.7, 1.1), least=0, most=10, length=2)  # m
+    speed_mps: float = number(10.0, above=0, most=100)  # outgoing speed that earns all
+    # in front of the character, where balls should land
+    depth_m: float = number(9.0, above=0, most=100)
+    width_m: float = number(2.0, least=0, most=100)  # to either side of it
+    spread_m: float = number(4.0, above=0, most=100)  # miss that costs a factor of e
 
     name: ClassVar[str] = "tennis_swing"
     links: ClassVar[dict[str, str]] = {"hand": "hand_r"}
