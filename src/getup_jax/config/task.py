@@ -47,6 +47,12 @@ class TaskConfig:
     start_noise_rad: float = 0.0  # joint noise of the start poses
     pool_size: int = 2048  # start states made once
     settle_s: float = 0.5  # lying starts rest this long before the pool keeps them
+    # share of the lying starts on flat ground that are limp bodies, not the motions' own poses; on
+    # irregular ground all of them are
+    limp_share: float = 0.0
+    drop_as: str = "limp"  # how these are dropped: limp | any | paper, see DROPS in tasks/falls.py
+    limp_drops: int = 1000  # how many on flat ground; terrain.drops on irregular ground
+    fallen_share: float = 0.0  # share of them that stood, were pushed and fell
 
     def __post_init__(self) -> None:
         share = self.stand_start + self.clip_start
@@ -68,3 +74,9 @@ class TaskConfig:
         now = self.lookahead_s[:1] == (0.0,)
         require(now, "task.lookahead_s", "times that start with 0, the present", self.lookahead_s)
         require(self.pool_size > 0, "task.pool_size", "more than 0", self.pool_size)
+        for name in ("limp_share", "fallen_share"):
+            share = getattr(self, name)
+            require(0 <= share <= 1, f"task.{name}", "between 0 and 1", share)
+        drops = ("limp", "any", "paper")
+        require(self.drop_as in drops, "task.drop_as", f"one of {drops}", self.drop_as)
+        require(self.limp_drops > 0, "task.limp_drops", "more than 0", self.limp_drops)
