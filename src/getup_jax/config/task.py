@@ -61,6 +61,14 @@ class TaskConfig:
     pool_size: int = number(2048, least=1, most=1_000_000)  # start states made once
     # lying starts rest this long before the pool keeps them
     settle_s: float = number(0.5, least=0, most=3600)
+    # share of the lying starts on flat ground that are limp bodies, not the motions' own poses; on
+    # irregular ground all of them are
+    limp_share: float = number(0.0, least=0, most=1)
+    drop_as: str = "limp"  # how these are dropped: limp | any | paper, see DROPS in tasks/falls.py
+    # how many on flat ground; terrain.drops on irregular ground
+    limp_drops: int = number(1000, least=1, most=1_000_000)
+    # share of them that stood, were pushed and fell
+    fallen_share: float = number(0.0, least=0, most=1)
 
     def __post_init__(self) -> None:
         check_numbers(self, "task")
@@ -70,3 +78,5 @@ class TaskConfig:
         require(ok, "task.focus", "more than 0 where task.assist is", self.focus)
         now = self.lookahead_s[:1] == (0.0,)
         require(now, "task.lookahead_s", "times that start with 0, the present", self.lookahead_s)
+        drops = ("limp", "any", "paper")
+        require(self.drop_as in drops, "task.drop_as", f"one of {drops}", self.drop_as)

@@ -19,7 +19,7 @@ from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain_map import REGIONS
 from getup_jax.tasks.build import BuiltTask
 from getup_jax.tasks.episode import LYING
-from getup_jax.tasks.reset_pool import Pool, angle_gap, build_pool
+from getup_jax.tasks.reset_pool import FlatStarts, Pool, angle_gap, build_pool
 from getup_jax.types import take
 
 _KEPT = 256  # start states kept, by what they start from
@@ -79,7 +79,8 @@ class Starts:
             getups = own.getups(clip)[:1]
             engine = self._task.environment.engine
             size = self._task.environment.action_size
-            return build_pool(getups, self.character, engine, self._config, self._seed, size)
+            flat = FlatStarts(getups, self.character, self._config, self._seed, size)
+            return build_pool(flat, engine, lambda _: None)
         return self._on_ground(curve, place)
 
     def _on_ground(self, curve: CurveFile, place: Place) -> Pool:

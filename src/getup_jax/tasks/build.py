@@ -20,10 +20,12 @@ from getup_jax.nets.prior_data import make_pose_set
 from getup_jax.paths import asset_path, cache_dir
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.engine import make_engine
+from getup_jax.physics.plane import Plane
 from getup_jax.physics.terrain import Ground, Terrain
 from getup_jax.physics.terrain_map import make_terrain
 from getup_jax.tasks import misfit
 from getup_jax.tasks.getup import GetUpTask, World
+from getup_jax.tasks.limp import LimpBodies
 from getup_jax.tasks.observation import Observer
 from getup_jax.tasks.region_pool import Site, build_region_pool
 from getup_jax.tasks.reset_pool import FlatStarts, build_pool
@@ -111,12 +113,14 @@ def assemble(
         latent_size=latent_size,
         terrain=config.terrain,
     )
+    place = Plane() if site is None else site.ground
+    limp = LimpBodies(on_ground, place, config.task, config.seed, log).on_the_flat()
+    flat = FlatStarts(getups, character, config.task, config.seed, action_size, limp)
     if site is None:
         terrain: Ground = Terrain.flat()
-        pool = build_pool(getups, character, engine, config.task, config.seed, action_size)
+        pool = build_pool(flat, engine, log)
     else:
         terrain = jax.tree.map(jnp.asarray, site.ground.field())
-        flat = FlatStarts(getups, character, config.task, config.seed, action_size)
         pool = build_region_pool(getups, flat, site, engine, config.task, log)
     points = jnp.asarray(np.stack([g.points for g in getups]), jnp.float32)
     if site is not None and config.task.focus > 0:

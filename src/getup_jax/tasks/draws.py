@@ -35,6 +35,9 @@ def whole_episodes(config: TaskConfig) -> TaskConfig:
         short_share=0.0,
         assist=0.0,
         head_grace_s=0.0,
+        limp_share=0.0,
+        drop_as="limp",
+        fallen_share=0.0,
     )
 
 

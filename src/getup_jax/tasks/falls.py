@@ -1,4 +1,4 @@
-"""Lying starts on irregular ground: a passive rag-doll falls and comes to rest [P 5.2].
+"""Lying starts of bodies that fall: a passive rag-doll is dropped and comes to rest [P 5.2].
 
 Everything runs on the host with MuJoCo, so that all engines get the same starts.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Callable
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -19,76 +20,154 @@ from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.settle import settle
 from getup_jax.physics.surface import lift, link_gaps
 from getup_jax.physics.terrain import HeightField
-from getup_jax.physics.terrain_map import REGIONS, TerrainMap
+from getup_jax.physics.terrain_map import REGIONS
 from getup_jax.tasks.set_down import to_normal
 
-DAMPING = 5.0  # Nms/rad of every hinge of the rag-doll; its servos are off
-_POSE_NOISE_RAD = 0.35
+DAMPING = 5.0  # Nms/rad of every hinge of a body that falls
 _GAP_M = 0.05  # it is dropped from this height
 _FALL_S, _MOST_FALLS = 1.5, 4  # it falls for this long, again and again while it moves
 _ROUNDS = 10  # of drops, until enough came to rest
 _HOLD_S = 0.5  # under its own servos, as the task has it
 _STILL = 0.3  # rad/s and m/s: slower is at rest
 _SUNK_M, _FLOAT_M = -0.02, 0.01  # gaps to the ground that no start may pass
-_PRONE, _SUPINE = 0.4, 0.4  # shares; the others fall on a side
+
+Log = Callable[[str], None]
+
+
+class Place(Protocol):
+    """Where bodies fall: irregular ground or the plane."""
+
+    def field(self) -> HeightField:
+        """The ground's heights, in NumPy."""
+        ...
+
+    def region(self, xy: np.ndarray) -> np.ndarray:
+        """Index into REGIONS of places xy [..., 2] (m)."""
+        ...
+
+    def draw_spawn(self, region: int, count: int, rng: np.random.Generator) -> np.ndarray:
+        """Random places [count, 2] (m) of a region where bodies may start."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True)
+class Drop:
+    """How bodies are dropped: their posture, and what their servos do while they fall."""
+
+    name: str  # of the cache's files
+    prone: float  # share; the others that are not supine fall on a side
+    supine: float
+    pose_noise_rad: float  # standard deviation of every hinge around the neutral pose
+    roll_spread_rad: float = 0.0  # turned about the long axis by up to this much more
+    strength: float = 0.0  # torque limits of the servos, which hold the pose; 0: servos off
+
+
+DROPS = {
+    # limp on the face, on the back and on a side
+    "limp": Drop("falls", prone=0.4, supine=0.4, pose_noise_rad=0.35),
+    # limp in every orientation, those in between too
+    "any": Drop("any", prone=0.35, supine=0.35, pose_noise_rad=0.35, roll_spread_rad=np.pi / 4),
+    # [P 5.2] drops prone and supine, [T 2.6] with "small torques"
+    "paper": Drop("paper", prone=0.4, supine=0.6, pose_noise_rad=0.0, strength=0.05),
+}
 
 
 @dataclasses.dataclass(frozen=True)
 class Starts:
-    """N states of the character on irregular ground."""
+    """N states of the character on the ground."""
 
     qpos: np.ndarray  # [N, 7 + J]
     qvel: np.ndarray  # [N, 6 + J]
     region: np.ndarray  # [N] index into REGIONS
 
+    @classmethod
+    def none(cls, character: CharacterSpec) -> Starts:
+        """No states of the character."""
+        nq, nv = character.model.nq, character.model.nv
+        return cls(np.zeros((0, nq)), np.zeros((0, nv)), np.zeros(0, int))
+
+    @classmethod
+    def join(cls, parts: list[Starts]) -> Starts:
+        """All of them in one, in their order."""
+        fields = [f.name for f in dataclasses.fields(cls)]
+        return cls(**{f: np.concatenate([getattr(part, f) for part in parts]) for f in fields})
+
+    def take(self, index: np.ndarray) -> Starts:
+        """Those of the given rows."""
+        return Starts(self.qpos[index], self.qvel[index], self.region[index])
+
 
 def fall(
     character: CharacterSpec,
-    ground: TerrainMap,
-    count: int,
-    seed: int,
-    log: Callable[[str], None],
+    place: Place,
+    wanted: np.ndarray,
+    drop: Drop,
+    rng: np.random.Generator,
+    log: Log,
 ) -> Starts:
-    """`count` rag-dolls at rest, equally many in every irregular region.
+    """Bodies at rest that were dropped, wanted [R] of them in every region.
 
     character: with the ground in its model. Falls that slide out of their region, or that do not
     come to rest, are dropped again elsewhere.
     """
-    rng = np.random.default_rng(seed)
-    field = ground.field()
-    wanted = np.bincount(1 + np.arange(count) % (len(REGIONS) - 1), minlength=len(REGIONS))
+    field = place.field()
+
+    def dropped(region: np.ndarray) -> Starts:
+        xy = spawn(place, region, rng)
+        qpos = _postures(character, drop, field.normal(xy), rng)
+        qpos[:, :2] = xy
+        qpos = lift(character, field, qpos, _GAP_M)
+        qpos = come_to_rest(character, qpos, drop.strength)
+        starts = fair_starts(character, place, qpos, region)
+        log(f"lying starts: {len(starts.region)} of {len(region)} rag-dolls came to rest")
+        return starts
+
+    return until_enough(wanted, dropped, "rag-dolls do not come to rest")
+
+
+def evenly(count: int, regions: int = len(REGIONS)) -> np.ndarray:
+    """Numbers [R] of `count` bodies, about equally many in every irregular region."""
+    return np.bincount(1 + np.arange(count) % (regions - 1), minlength=regions)
+
+
+def until_enough(wanted: np.ndarray, make: Callable[[np.ndarray], Starts], problem: str) -> Starts:
+    """The first wanted [R] starts of every region, out of those that make(regions [N]) finds fair.
+
+    Raises ConfigError with the problem where a region has too few after several rounds.
+    """
     kept: list[Starts] = []
     missing = wanted
     for _ in range(_ROUNDS):
-        region = np.repeat(np.arange(len(REGIONS)), np.ceil(1.15 * missing).astype(int))
-        kept.append(_drop(character, ground, field, region, rng))
-        log(f"lying starts: {len(kept[-1].region)} of {len(region)} rag-dolls came to rest")
-        found = np.concatenate([starts.region for starts in kept])
-        missing = np.maximum(wanted - np.bincount(found, minlength=len(REGIONS)), 0)
+        kept.append(make(np.repeat(np.arange(len(wanted)), np.ceil(1.15 * missing).astype(int))))
+        region = np.concatenate([starts.region for starts in kept])
+        missing = np.maximum(wanted - np.bincount(region, minlength=len(wanted)), 0)
         if not missing.any():
-            return _first(kept, wanted)
+            first = [np.flatnonzero(region == i)[:number] for i, number in enumerate(wanted)]
+            return Starts.join(kept).take(np.concatenate(first))
+    where = REGIONS[int(missing.argmax())]
+    if where == REGIONS[0]:
+        raise ConfigError(f"task.limp_share: {problem} on flat ground; see the physics settings")
     raise ConfigError(
-        f"terrain: rag-dolls do not come to rest in the region {REGIONS[int(missing.argmax())]!r}; "
+        f"terrain: {problem} in the region {where!r}; "
         "make terrain.slope_deg or terrain.rough_m smaller"
     )
 
 
-def _drop(
-    character: CharacterSpec,
-    ground: TerrainMap,
-    field: HeightField,
-    region: np.ndarray,
-    rng: np.random.Generator,
-) -> Starts:
-    """One fall a row of region [N]; those that make a fair start."""
+def spawn(place: Place, region: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Random places [N, 2] (m) in the regions [N]."""
     xy = np.zeros((len(region), 2))
     for index in np.unique(region):
-        xy[region == index] = ground.draw_spawn(int(index), int((region == index).sum()), rng)
-    qpos = _postures(character, xy, field.normal(xy), rng)
-    qpos = _come_to_rest(character, lift(character, field, qpos, _GAP_M))
+        xy[region == index] = place.draw_spawn(int(index), int((region == index).sum()), rng)
+    return xy
+
+
+def fair_starts(
+    character: CharacterSpec, place: Place, qpos: np.ndarray, region: np.ndarray
+) -> Starts:
+    """Those of the poses [N, 7 + J] that lie still in their regions [N] under their own servos."""
     qpos, qvel = settle(character, qpos, _HOLD_S)
-    ok = (ground.region(qpos[:, :2]) == region) & (np.abs(qvel).max(axis=1) < _STILL)
-    ok &= is_on_ground(character, field, qpos)
+    ok = (place.region(qpos[:, :2]) == region) & (np.abs(qvel).max(axis=1) < _STILL)
+    ok &= is_on_ground(character, place.field(), qpos)
     return Starts(qpos[ok], qvel[ok], region[ok])
 
 
@@ -99,36 +178,48 @@ def is_on_ground(character: CharacterSpec, field: HeightField, qpos: np.ndarray)
 
 
 def _postures(
-    character: CharacterSpec, xy: np.ndarray, normal: np.ndarray, rng: np.random.Generator
+    character: CharacterSpec, drop: Drop, normal: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """Limp poses [N, 7 + J], prone, supine or on a side along the slope, with any heading."""
-    size = len(xy)
+    """Poses [N, 7 + J], prone, supine or on a side along the slope, with any heading."""
+    size = len(normal)
     qpos = np.tile(character.neutral_qpos, (size, 1))
-    limp = qpos[:, 7:] + _POSE_NOISE_RAD * rng.standard_normal(qpos[:, 7:].shape)
+    limp = qpos[:, 7:] + drop.pose_noise_rad * rng.standard_normal(qpos[:, 7:].shape)
     qpos[:, 7:] = np.clip(limp, character.joint_lower, character.joint_upper)
     draw = rng.uniform(size=size)
     # turned about the body's long axis: 0 on the face, pi on the back, half on a side
     side = rng.choice([-0.5, 0.5], size=size) * np.pi
-    roll = np.where(draw < _PRONE, 0.0, np.where(draw < _PRONE + _SUPINE, np.pi, side))
+    lies_supine = draw < drop.prone + drop.supine
+    roll = np.where(draw < drop.prone, 0.0, np.where(lies_supine, np.pi, side))
     vertical = np.array([[0.0, 0.0, 1.0]])
+    heading = Rotation.from_rotvec(rng.uniform(-np.pi, np.pi, (size, 1)) * vertical)
+    if drop.roll_spread_rad > 0:
+        roll = roll + rng.uniform(-drop.roll_spread_rad, drop.roll_spread_rad, size)
     lying = Rotation.from_rotvec([0.0, np.pi / 2, 0.0])
     lying = lying * Rotation.from_rotvec(roll[:, None] * vertical)
-    heading = Rotation.from_rotvec(rng.uniform(-np.pi, np.pi, (size, 1)) * vertical)
-    turn = to_normal(normal) * heading * lying
-    qpos[:, :2], qpos[:, 3:7] = xy, turn.as_quat(scalar_first=True)
+    qpos[:, 3:7] = (to_normal(normal) * heading * lying).as_quat(scalar_first=True)
     return qpos
 
 
-def _come_to_rest(character: CharacterSpec, qpos: np.ndarray) -> np.ndarray:
-    """Poses [N, 7 + J] after a passive fall; NaN where the simulation failed."""
-    model = copy.copy(character.model)
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
-    model.dof_damping[6:] = DAMPING
+def come_to_rest(
+    character: CharacterSpec,
+    qpos: np.ndarray,
+    strength: float,
+    qvel: np.ndarray | None = None,
+    target: np.ndarray | None = None,
+) -> np.ndarray:
+    """Poses [N, 7 + J] after a fall from qpos and qvel, None: at rest; NaN where it failed.
+
+    Servos with a share `strength` of their torque limits (0: they are off) hold the hinges at
+    target [N, J] meanwhile; None: at those of qpos.
+    """
+    model = falling_model(character, strength)
+    target = qpos[:, 7:].copy() if target is None else target
+    velocity = np.zeros((len(qpos), model.nv)) if qvel is None else qvel.copy()
     qpos, moving = qpos.copy(), np.arange(len(qpos))
-    velocity = np.zeros((len(qpos), model.nv))
     for _ in range(_MOST_FALLS):
         batch = Batch(model, len(moving))
         batch.qpos[:], batch.qvel[:] = qpos[moving], velocity[moving]
+        batch.ctrl[:] = target[moving]
         try:
             batch.step(nstep=round(_FALL_S / model.opt.timestep))
         except SimulationError as error:
@@ -140,12 +231,11 @@ def _come_to_rest(character: CharacterSpec, qpos: np.ndarray) -> np.ndarray:
     return qpos
 
 
-def _first(kept: list[Starts], wanted: np.ndarray) -> Starts:
-    """The first `wanted` [R] starts of every region."""
-    qpos, qvel, region = (
-        np.concatenate([getattr(s, name) for s in kept]) for name in ("qpos", "qvel", "region")
-    )
-    index = np.concatenate(
-        [np.flatnonzero(region == i)[:number] for i, number in enumerate(wanted)]
-    )
-    return Starts(qpos[index], qvel[index], region[index])
+def falling_model(character: CharacterSpec, strength: float) -> mujoco.MjModel:
+    """The character's model with weak servos, or none, and hinges that damp."""
+    model = copy.copy(character.model)
+    if strength == 0:
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    model.actuator_forcerange *= strength
+    model.dof_damping[6:] = DAMPING
+    return model

@@ -11,13 +11,13 @@ import numpy as np
 
 from getup_jax.config import ConfigError, TaskConfig, TerrainConfig
 from getup_jax.motion.clips import GetUp
-from getup_jax.nets.prior_data import pose_conditions
 from getup_jax.paths import cache_dir
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.physics.settle import settle
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
-from getup_jax.tasks.falls import Starts, fall
+from getup_jax.tasks.falls import Starts
+from getup_jax.tasks.limp import LimpBodies
+from getup_jax.tasks.matching import fits, least_used
 from getup_jax.tasks.reset_pool import (
     FlatStarts,
     FreeStarts,
@@ -61,26 +61,26 @@ def build_region_pool(
     `clip_everywhere`; one that no rag-doll fits is left out of the region.
     """
     irregular = _irregular_starts(site, config, log)
-    fits = _fits(getups, irregular[LYING], site.character, config)
+    fair = fits(getups, irregular[LYING].qpos, site.character, config.curve_match_rad)
     rows, rng = _rows(config, len(getups)), np.random.default_rng(flat.seed)
     table = np.zeros((3, len(REGIONS), len(getups), rows), np.int32)
-    parts = [_on_the_flat(flat, site, table, rng)]
+    parts = [_on_the_flat(flat, site, table, rng, log)]
     startable = np.ones((len(REGIONS), len(getups)), bool)
     for region in range(1, len(REGIONS)):
         own = {kind: starts.region == region for kind, starts in irregular.items()}
-        startable[region] = fits[own[LYING]].any(axis=0)
+        startable[region] = fair[own[LYING]].any(axis=0)
         _check_region(startable[region], region, getups, config, log)
         for kind in (LYING, STANDING):
             used = np.zeros(len(own[kind]), int)
             for style, getup in enumerate(getups):
-                fair = own[kind] & fits[:, style] if kind == LYING else own[kind]
+                chosen = own[kind] & fair[:, style] if kind == LYING else own[kind]
                 # a style that cannot start here is never drawn, but its rows must hold something
-                index = _least_used(fair if fair.any() else own[kind], used, rows, rng)
+                index = least_used(chosen if chosen.any() else own[kind], used, rows, rng)
                 time = np.full(rows, getup.duration if kind == STANDING else 0.0)
                 table[kind, region, style] = sum(len(p) for p in parts) + np.arange(rows)
                 none = np.full((rows, flat.action_size), np.nan)
-                chosen = irregular[kind].qpos[index], irregular[kind].qvel[index]
-                parts.append(FreeStarts(*chosen, time, none))
+                starts = irregular[kind].take(index)
+                parts.append(FreeStarts(starts.qpos, starts.qvel, time, none))
         if config.clip_everywhere:
             size = sum(len(p) for p in parts)
             table[CLIP, region] = size + np.arange(len(getups) * rows).reshape(-1, rows)
@@ -123,16 +123,6 @@ def _pool(
     )
 
 
-def _least_used(
-    fair: np.ndarray, used: np.ndarray, count: int, rng: np.random.Generator
-) -> np.ndarray:
-    """`count` of the starts where fair [N], first those that fewer styles have: see used [N]."""
-    order = rng.permutation(np.flatnonzero(fair))
-    chosen = np.resize(order[np.argsort(used[order], kind="stable")], count)
-    np.add.at(used, chosen, 1)
-    return chosen
-
-
 def region_starts(pool: Pool, episodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Styles, rows and regions [N] int32 of episodes that visit all regions and styles in turn.
 
@@ -160,39 +150,22 @@ def _irregular_starts(site: Site, config: TaskConfig, log: Log) -> dict[int, Sta
     place, seed = cache_dir() / "starts", site.config.seed
     standing = Request("standing", max(30, site.config.drops // 5), seed)
 
-    def drop(request: Request, log: Log) -> Starts:
-        return fall(site.character, site.ground, request.count, request.seed, log)
-
     def rise(request: Request, log: Log) -> Starts:
         return stand(site.character, site.ground, request.count, request.seed, log)
 
-    falls = Request("falls", site.config.drops, seed)
-    return {
-        LYING: cached_starts(falls, site.character, drop, place, log),
-        STANDING: cached_starts(standing, site.character, rise, place, log),
-    }
+    bodies = LimpBodies(site.character, site.ground, config, seed, log)
+    stands = cached_starts(standing, site.character, rise, place, log)
+    return {LYING: bodies.on_slopes(site.config.drops, stands), STANDING: stands}
 
 
 def _on_the_flat(
-    flat: FlatStarts, site: Site, table: np.ndarray, rng: np.random.Generator
+    flat: FlatStarts, site: Site, table: np.ndarray, rng: np.random.Generator, log: Log
 ) -> FreeStarts:
     """The flat region's starts, the first in the pool; their rows are written into the table."""
     starts, table[:, 0] = flat.make(table.shape[-1])
     starts.qpos[:, :2] += site.ground.draw_spawn(0, len(starts), rng)
-    lying = np.unique(table[LYING, 0])
-    starts.qpos[lying], starts.qvel[lying] = settle(
-        site.character, starts.qpos[lying], flat.config.settle_s
-    )
+    flat.lay_down(starts, table[LYING, 0], site.character, log)
     return starts
-
-
-def _fits(
-    getups: Sequence[GetUp], starts: Starts, character: CharacterSpec, config: TaskConfig
-) -> np.ndarray:
-    """Whether a start's torso angles are near a style's first ones, [N, G] [P 5.2]."""
-    angles = pose_conditions(starts.qpos, character)[:, None, 1:]
-    first = np.stack([getup.points[0, 1:] for getup in getups])
-    return np.abs(angles - first).max(axis=-1) <= config.curve_match_rad
 
 
 def _check_region(

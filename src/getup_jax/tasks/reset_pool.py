@@ -18,6 +18,8 @@ from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.settle import lift_to_ground, settle
 from getup_jax.physics.surface import TOUCH_M
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
+from getup_jax.tasks.falls import Log, Starts
+from getup_jax.tasks.matching import fits, least_used
 from getup_jax.tasks.paths import FoundPath, load_paths
 from getup_jax.tasks.references import Reference, make_references, velocities
 from getup_jax.types import Engine, PhysicsState
@@ -65,23 +67,15 @@ class Pool:
     misfit: jax.Array | None = None  # [P] int32, see misfit.py; None: nobody asks
 
 
-def build_pool(
-    getups: Sequence[GetUp],
-    character: CharacterSpec,
-    engine: Engine,
-    config: TaskConfig,
-    seed: int,
-    action_size: int,
-) -> Pool:
-    """Make the start states of all kinds that the config asks for.
+def build_pool(flat: FlatStarts, engine: Engine, log: Log) -> Pool:
+    """Make the start states of all kinds that the config asks for, on the flat plane.
 
     A kind with no share still gets one row a style, so that the table has one form.
     """
-    kinds = sum(share > 0 for share in kind_shares(config))
-    rows = max(1, config.pool_size // max(1, len(getups) * kinds))
-    starts, table = FlatStarts(getups, character, config, seed, action_size).make(rows)
-    lying = np.unique(table[LYING])
-    starts.qpos[lying], starts.qvel[lying] = settle(character, starts.qpos[lying], config.settle_s)
+    kinds = sum(share > 0 for share in kind_shares(flat.config))
+    rows = max(1, flat.config.pool_size // max(1, len(flat.getups) * kinds))
+    starts, table = flat.make(rows)
+    flat.lay_down(starts, table[LYING], flat.character, log)
     physics = engine.place(starts.qpos, starts.qvel)
     check_finite(physics, starts.qpos)
     return Pool(
@@ -107,11 +101,12 @@ class FlatStarts:
     config: TaskConfig
     seed: int
     action_size: int
+    limp: Starts | None = None  # limp bodies on flat ground; None: no lying start is one
 
     def make(self, rows: int) -> tuple[FreeStarts, np.ndarray]:
         """P start states and the table [3, G, rows] of their rows.
 
-        Lying starts hang just above the ground; the caller lets them settle.
+        Lying starts hang just above the ground, see `lay_down`.
         """
         counts = [rows if share > 0 else 1 for share in kind_shares(self.config)]
         make = self._maker()
@@ -129,6 +124,35 @@ class FlatStarts:
         qpos[lying] = lift_to_ground(self.character, qpos[lying], _DROP_M)
         qpos[free] = lift_to_ground(self.character, qpos[free], -TOUCH_M)
         return starts, table
+
+    def lay_down(
+        self, starts: FreeStarts, table: np.ndarray, character: CharacterSpec, log: Log
+    ) -> None:
+        """Let the lying starts of the rows in the table [G, rows] settle, in place.
+
+        character: on the ground where they are. The config's share of them is replaced by limp
+        bodies that fit the style; a style that none fits keeps its own poses.
+        """
+        lying = np.unique(table)
+        starts.qpos[lying], starts.qvel[lying] = settle(
+            character, starts.qpos[lying], self.config.settle_s
+        )
+        if self.limp is None:
+            return
+        fair = fits(self.getups, self.limp.qpos, character, self.config.curve_match_rad)
+        count = round(self.config.limp_share * table.shape[1])
+        used, rng = np.zeros(len(fair), int), np.random.default_rng((self.seed, count))
+        some = np.asarray(fair.any(axis=0))
+        for style in np.flatnonzero(some):
+            body = least_used(fair[:, style], used, count, rng)
+            replaced = table[style, :count]
+            starts.qpos[replaced], starts.qvel[replaced] = (
+                self.limp.qpos[body],
+                self.limp.qvel[body],
+            )
+        own = [g.name for g, ok in zip(self.getups, some, strict=True) if not ok]
+        if own:
+            log(f"start states: no limp body on flat ground fits {', '.join(own)}")
 
     def _maker(self) -> _StartMaker:
         getups, character, config = self.getups, self.character, self.config
