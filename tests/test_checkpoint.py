@@ -22,7 +22,8 @@ from getup_jax.storage import CheckpointError, from_nested
 
 def save(folder: Path, iteration: int, keep: int = 2, width: int = 8) -> Path:
     config = settings.load_config(None, [f"train.keep={keep}", "seed=5"])
-    item = {"policy": make_policy(iteration, width), "prior": {"decoder": jnp.ones((2, 2))}}
+    prior, critic = {"decoder": jnp.ones((2, 2))}, {"critic": jnp.full(3, 7.0)}
+    item = {"policy": make_policy(iteration, width), "prior": prior, "critic": critic}
     state = make_state(iteration, width)
     return save_learner(folder, iteration, state, config, item, {"steps": iteration * 10})
 
@@ -285,6 +286,7 @@ def test_export_copies_only_the_policy(saved, tmp_path):
     loaded, original = load_policy(exported), load_policy(saved)
     assert_same(loaded.policy, original.policy)
     assert_same(loaded.prior, original.prior)
+    assert_same(loaded.critic, {"critic": jnp.full(3, 7.0)})
     assert dataclasses.replace(loaded.config) == original.config
     assert loaded.config.train.init_from is None
     with pytest.raises(CheckpointError, match="has no item 'learner'"):

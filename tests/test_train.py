@@ -35,13 +35,18 @@ class Policy:
 class LearnerState:
     policy: Policy
     count: jax.Array
+    critic: jax.Array
 
     @property
     def averaged_policy(self) -> Policy:
         return self.policy
 
-    def beginning_with(self, policy: Policy) -> LearnerState:
-        return LearnerState(policy, self.count)
+    @property
+    def valuation(self) -> dict:
+        return {"critic": self.critic}
+
+    def beginning_with(self, policy: Policy, valuation: dict) -> LearnerState:
+        return LearnerState(policy, self.count, valuation["critic"])
 
 
 @struct.dataclass
@@ -60,7 +65,8 @@ class ToyLearner:
         self._bad_loss_at, self._bad_weight_at = bad_loss_at, bad_weight_at
 
     def init(self, world: Any, key: jax.Array) -> State:
-        learner = LearnerState(Policy(jax.random.normal(key, (2,))), jnp.zeros((), jnp.int32))
+        zero = jnp.zeros(())
+        learner = LearnerState(Policy(jax.random.normal(key, (2,))), zero.astype(jnp.int32), zero)
         rows = jax.random.bits(key, (3, 2), jnp.uint32)
         return State(learner, rows, jnp.array(key), jnp.zeros((), jnp.int32))
 
@@ -76,7 +82,8 @@ class ToyLearner:
             "episode/success": jnp.where(number % 2 == 0, 1.0, jnp.nan),
             "loss/value": jnp.where(number == self._bad_loss_at, jnp.nan, 1.0),
         }
-        learner = LearnerState(Policy(weight), state.learner.count + 1)
+        old = state.learner
+        learner = LearnerState(Policy(weight), old.count + 1, old.critic + 1.0)
         return State(learner, state.environment * 3 + 1, state.key, number), metrics
 
 
@@ -198,10 +205,22 @@ def test_another_seed_is_another_run(tmp_path, unbroken):
 def test_a_run_can_start_from_the_policy_of_another(tmp_path, unbroken):
     train(tmp_path, 1, f"train.init_from={unbroken}")
     assert history(tmp_path) != history(unbroken)[:1]
-    # The rest is that of a fresh run: only the policy was taken.
+    # The rest is that of a fresh run: only the policy was taken, and its critic.
     fresh, started = (arrays(folder, 1)["state"] for folder in (unbroken, tmp_path))
     np.testing.assert_array_equal(fresh["environment"], started["environment"])
     np.testing.assert_array_equal(fresh["learner"]["count"], started["learner"]["count"])
+    last = arrays(unbroken)["state"]["learner"]["critic"]
+    np.testing.assert_array_equal(started["learner"]["critic"], last + 1.0)
+
+
+def test_a_policy_s_critic_of_another_form_is_left_out(tmp_path, unbroken):
+    source = checkpoint.load_policy(unbroken)
+    item = {"policy": source.policy, "prior": source.prior, "critic": {"critic": np.zeros(3)}}
+    state = {"nothing": np.zeros(1)}
+    checkpoint.save_learner(tmp_path / "other", 1, state, source.config, item)
+    train(tmp_path / "run", 1, f"train.init_from={tmp_path / 'other'}")
+    fresh, started = (arrays(folder, 1)["state"] for folder in (unbroken, tmp_path / "run"))
+    np.testing.assert_array_equal(fresh["learner"]["critic"], started["learner"]["critic"])
 
 
 def test_a_run_can_go_on_with_the_learner_of_another(tmp_path, unbroken):

@@ -3,7 +3,7 @@
     FOLDER/00000120/            one checkpoint, named by its iteration
         checkpoint.json         format, iteration, steps, and the digest of every array file
         config.yaml             the resolved settings
-        policy/                 orbax: {"policy": ..., "prior": ...}, loadable alone
+        policy/                 orbax: {"policy": ..., "prior": ..., "critic": ...}, loadable alone
         learner/                orbax: {"state": the whole TrainState}
 
 A checkpoint is built in a hidden folder and renamed when all of it is on the disk, so that
@@ -41,6 +41,7 @@ class LoadedPolicy:
     config: Config
     metadata: dict[str, Any]  # iteration, steps and the like
     path: Path  # the checkpoint's own folder
+    critic: Any = None  # Valuation by name; None: it was saved without one
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,7 +77,8 @@ def save_learner(
         iteration: iterations done.
         train_state: any pytree of arrays.
         config: written as config.yaml.
-        policy: the light item: {"policy": pytree, "prior": pytree or None}.
+        policy: the light item: {"policy": pytree, "prior": pytree or None}, and "critic" where a
+            training that begins with it shall have it.
         metadata: what else checkpoint.json shall say; JSON values.
 
     Raises CheckpointError where it could not be written; the others are then untouched.
@@ -118,7 +120,8 @@ def load_policy(path: str | Path) -> LoadedPolicy:
     except ConfigError as error:
         hint = "it was written with other settings; use the version of getup_jax that wrote it"
         raise CheckpointError(f"{found}: {error}; {hint}") from None
-    return LoadedPolicy(nested["policy"], nested.get("prior"), config, metadata, found)
+    prior, critic = nested.get("prior"), nested.get("critic")
+    return LoadedPolicy(nested["policy"], prior, config, metadata, found, critic)
 
 
 def export_policy(source: str | Path, destination: str | Path) -> Path:
@@ -130,7 +133,8 @@ def export_policy(source: str | Path, destination: str | Path) -> Path:
     loaded, destination = load_policy(source), Path(destination)
     if destination.exists() and not manifest.is_checkpoint(destination):
         raise CheckpointError(f"{destination}: exists and is no checkpoint; choose another folder")
-    items = {POLICY: {"policy": loaded.policy, "prior": loaded.prior}}
+    item = {"policy": loaded.policy, "prior": loaded.prior}
+    items = {POLICY: item if loaded.critic is None else {**item, "critic": loaded.critic}}
     task = dataclasses.replace(loaded.config.task, paths=None)
     train = dataclasses.replace(loaded.config.train, init_from=None, init_learner=False)
     physics = dataclasses.replace(loaded.config.physics, engine="auto")

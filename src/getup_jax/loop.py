@@ -69,7 +69,8 @@ class Loop:
         elif config.train.init_from is not None:
             self._load_policy(config.train.init_from)
         elif job.prepare is not None:
-            self._begin_with(job.prepare(self._state.learner.policy, display.log))
+            learner = self._state.learner
+            self._begin_with(job.prepare(learner.policy, display.log), learner.valuation)
         self._step = self._compile()
 
     @property
@@ -109,7 +110,20 @@ class Loop:
             policy = self._state.learner.policy  # not the average of its weights
         if self._job.carry_over is not None:
             policy = self._job.carry_over(policy, loaded, self._display.log)
-        self._begin_with(policy)
+        self._begin_with(policy, self._loaded_valuation(loaded))
+
+    def _loaded_valuation(self, loaded: checkpoint.LoadedPolicy) -> Any:
+        """The critic that came with a policy, or the run's own."""
+        own = self._state.learner.valuation
+        if loaded.critic is None or self._config.train.init_learner:
+            return own
+        try:
+            found = from_nested(own, loaded.critic, str(loaded.path))
+        except CheckpointError as error:
+            self._display.log(f"a new critic, since that of the policy does not fit: {error}")
+            return own
+        self._display.log("with its critic")
+        return found
 
     def _load_learner(self, path: str) -> None:
         loaded = checkpoint.load_learner(path)
@@ -121,9 +135,9 @@ class Loop:
         self._state = dataclasses.replace(state, learner=learner, environment=environment)
         self._display.log(f"going on with the learner of {where}; the simulations begin anew")
 
-    def _begin_with(self, policy: Any) -> None:
+    def _begin_with(self, policy: Any, valuation: Any) -> None:
         # a copy: what the first iteration donates must be nobody else's
-        learner = owned(self._state.learner.beginning_with(policy))
+        learner = owned(self._state.learner.beginning_with(policy, valuation))
         self._state = dataclasses.replace(self._state, learner=learner)
 
     def _compile(self) -> Step:
@@ -153,7 +167,9 @@ class Loop:
     def _save(self) -> None:
         if self.saved is not None and int(self.saved.name) == self.done:
             return
-        item = to_nested({"policy": self._state.learner.averaged_policy, "prior": self._job.prior})
+        learner = self._state.learner
+        parts = {"policy": learner.averaged_policy, "critic": learner.valuation}
+        item = to_nested({**parts, "prior": self._job.prior})
         if not is_finite(item):
             raise self._error("a weight of the policy is not a finite number")
         metadata = {"steps": self.steps}

@@ -23,6 +23,14 @@ class PolicyState:
 
 
 @struct.dataclass
+class Valuation:
+    """What values need; with a policy that goes on training, its critic need not begin anew."""
+
+    critic: Any  # variables of the critic network
+    popart: PopArt | None  # [K]; None: targets in return units
+
+
+@struct.dataclass
 class LearnerState:
     """What a checkpoint keeps of the learner."""
 
@@ -41,9 +49,20 @@ class LearnerState:
         """The policy to evaluate and export: the averaged actor, the newest statistics."""
         return dataclasses.replace(self.policy, actor=self.average)
 
-    def beginning_with(self, policy: PolicyState) -> LearnerState:
-        """The learner with another policy, which so far is its own average."""
-        return dataclasses.replace(self, policy=policy, average=policy.actor)
+    @property
+    def valuation(self) -> Valuation:
+        """What an exported policy keeps of the critic."""
+        return Valuation(self.critic, self.popart)
+
+    def beginning_with(self, policy: PolicyState, valuation: Valuation) -> LearnerState:
+        """The learner with another policy, which so far is its own average, and its critic."""
+        return dataclasses.replace(
+            self,
+            policy=policy,
+            average=policy.actor,
+            critic=valuation.critic,
+            popart=valuation.popart,
+        )
 
 
 @struct.dataclass
