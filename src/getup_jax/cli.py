@@ -27,7 +27,8 @@ examples:
   getup-train composite_wave_squat                     composite motion, see docs/composite.md
 
 A run folder holds config.yaml (every setting), metrics.jsonl and times.jsonl (one line an
-iteration) and checkpoints/. Ctrl-C and SIGTERM save and exit; a second Ctrl-C exits at once.
+iteration) and checkpoints/. Ctrl-C, SIGTERM and closing the terminal save and exit; a second Ctrl-C
+exits at once.
 """
 
 

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import math
+import os
+import sys
 from collections.abc import Mapping
+from typing import IO, Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
@@ -11,6 +16,7 @@ from rich.table import Column
 
 # The figures shown: the last part of a metric's name (`rollout/reward_total`), and its label.
 KEY_METRICS = {"reward_total": "reward", "return_rate": "return rate", "success": "success"}
+_GONE = (errno.EIO, errno.EPIPE)  # of a terminal that was closed, of a pipe
 
 
 class Display:
@@ -28,7 +34,8 @@ class Display:
     ) -> None:
         self._total, self._unit = total, unit
         self._quiet = quiet
-        self._console = console or Console(highlight=False, soft_wrap=True)
+        output: Any = _Output(sys.stdout)
+        self._console = console or Console(file=output, highlight=False, soft_wrap=True)
         self._bar: Progress | None = None
 
     def log(self, message: str) -> None:
@@ -67,6 +74,38 @@ class Display:
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
+
+
+class _Output:
+    """Standard output that no longer matters where its terminal or reader is gone.
+
+    A training whose window was closed has still to be saved.
+    """
+
+    def __init__(self, stream: IO[str]) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """As the stream's."""
+        self._do("write", text)
+        return len(text)
+
+    def flush(self) -> None:
+        """As the stream's."""
+        self._do("flush")
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def _do(self, name: str, *arguments: str) -> None:
+        try:
+            getattr(self._stream, name)(*arguments)
+        except OSError as error:
+            if error.errno not in _GONE:
+                return  # a full disk may have space for the next line
+            # to nowhere from here on, also what Python still has to flush when it ends
+            with contextlib.suppress(OSError), open(os.devnull, "w") as nowhere:
+                os.dup2(nowhere.fileno(), self._stream.fileno())
 
 
 def describe(

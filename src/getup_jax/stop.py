@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a request that a loop reads between two iterations.
+"""Ctrl-C, SIGTERM and a closed terminal as a request that a loop reads between two iterations.
 
 Python runs its own signal handlers only between two byte codes of the main thread, which
 is far too late while that thread waits for a long XLA program. So a thread of ours reads
@@ -8,13 +8,19 @@ the signals from a wake-up socket: the user has an answer at once.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import signal
 import socket
 import threading
+import time
 from collections.abc import Callable
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_HANGUP = getattr(signal, "SIGHUP", None)  # Windows has none
+_SIGNALS = tuple(s for s in (signal.SIGINT, signal.SIGTERM, _HANGUP) if s is not None)
+# `timeout` and process managers send a signal to the process and to its group, which is one
+# request; nobody's second thought comes as soon
+_SAME_S = 1.0
 _SHOW_CURSOR = b"\x1b[?25h"
 
 
@@ -22,14 +28,16 @@ class StopRequest:
     """A context manager; `signal` is the number of the signal that came, or None.
 
     Outside of `armed` there is nothing to save, and a signal ends the process at once; so
-    does a second Ctrl-C in it. Does nothing where it is entered in another than the main
-    thread, since only that one may handle signals.
+    does a second Ctrl-C in it. The same signal again within a second is the same request. What
+    `nohup` has switched off stays off. Does nothing where it is entered in another than the
+    main thread, since only that one may handle signals.
     """
 
     def __init__(self, log: Callable[[str], None]) -> None:
         self.signal: int | None = None
         self._log = log
         self._armed = False
+        self._came: dict[int, float] = {}  # signal -> when it was last taken for a request
         self._undo = contextlib.ExitStack()
 
     @contextlib.contextmanager
@@ -58,6 +66,8 @@ class StopRequest:
         self._undo.callback(thread.join)
         self._undo.callback(writer.close)
         for number in _SIGNALS:
+            if number == _HANGUP and signal.getsignal(number) == signal.SIG_IGN:
+                continue
             # With a handler in Python, the signal number is written to the wake-up socket.
             self._undo.callback(signal.signal, number, signal.signal(number, lambda *_: None))
         before = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
@@ -70,7 +80,10 @@ class StopRequest:
                     self._handle(numbers[0])
 
     def _handle(self, number: int) -> None:
-        again = self.signal is not None
+        now, again = time.monotonic(), self.signal is not None
+        if now - self._came.get(number, -math.inf) < _SAME_S:
+            return
+        self._came[number] = now
         if not self._armed or (again and number == signal.SIGINT):
             self._exit(number)
         if not again:

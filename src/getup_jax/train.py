@@ -109,7 +109,7 @@ def run(
     quiet: bool = False,
     build: Callable[[Config, Log], Job] = build_job,
 ) -> int | None:
-    """Train until `train.total_steps`, or until Ctrl-C or SIGTERM.
+    """Train until `train.total_steps`, or until Ctrl-C, SIGTERM or SIGHUP.
 
     Args:
         config: the settings; written into the folder.

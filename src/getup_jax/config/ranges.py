@@ -22,7 +22,7 @@ from getup_jax.config.check import ConfigError, shown
 
 LAST_SEED = 2**32 - 1  # of JAX's keys
 MOST_COUNT = 2**31 - 1  # of the counters on the device, which are int32
-MOST_SAMPLES = 2**22  # of an iteration: their observations alone are some GB
+MOST_SAMPLES = 2**21  # of an iteration: their observations alone are some GB
 
 Length = int | tuple[int, int]  # of a list: so many numbers, or from so many to so many
 T = TypeVar("T")
