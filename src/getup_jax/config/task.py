@@ -44,6 +44,11 @@ class TaskConfig:
     # ground in regions where more fails
     focus: float = 0.0
     focus_even: bool = False  # as often for a style with one part at the frontier as with ten
+    # share of the training episodes whose curves are drawn: blends of styles that start alike,
+    # their control points moved by smooth noise, over other durations; see tasks/drawn_curves.py
+    drawn_share: float = 0.0
+    curve_noise: float = 1.0  # of drawn curves; 1: rms of .08 m, 10 degrees (side), 12 (front)
+    duration_range: tuple[float, float] = (0.75, 1.3)  # of drawn curves: T x U(low, high)
     start_noise_rad: float = 0.0  # joint noise of the start poses
     pool_size: int = 2048  # start states made once
     settle_s: float = 0.5  # lying starts rest this long before the pool keeps them
@@ -62,6 +67,12 @@ class TaskConfig:
         ok = 0 <= self.assist_share < 1
         require(ok, "task.assist_share", "at least 0 and less than 1", self.assist_share)
         require(self.head_grace_s >= 0, "task.head_grace_s", "at least 0", self.head_grace_s)
+        ok = 0 <= self.drawn_share <= 1
+        require(ok, "task.drawn_share", "between 0 and 1", self.drawn_share)
+        require(self.curve_noise >= 0, "task.curve_noise", "at least 0", self.curve_noise)
+        low, high = self.duration_range
+        expected = "two numbers of more than 0, the smaller one first"
+        require(0 < low <= high, "task.duration_range", expected, self.duration_range)
         require(self.short_s > 0, "task.short_s", "more than 0", self.short_s)
         require(0 <= self.path_share <= 1, "task.path_share", "between 0 and 1", self.path_share)
         require(0 < self.filter <= 1, "task.filter", "more than 0 and at most 1", self.filter)
