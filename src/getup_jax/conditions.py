@@ -76,6 +76,7 @@ class Plan:
     duration_scale: np.ndarray  # [N] float32
     impulse: np.ndarray  # [N, 3] Ns, zero: no push
     region: np.ndarray | None = None  # [N] int32 index into REGIONS; None: a flat plane
+    points: np.ndarray | None = None  # [N, 9, 3] float32 control points; None: of the styles
 
     def on_regions(self, pool: Pool) -> Plan:
         """The same on irregular ground: its regions in turn, and the styles that start there."""

@@ -19,6 +19,7 @@ from getup_jax.motion.clips import GetUp
 from getup_jax.naturalness import FootPoints, self_penetration
 from getup_jax.physics.push import push
 from getup_jax.tasks.build import BuiltTask
+from getup_jax.tasks.drawn_curves import Curve, style_curve
 from getup_jax.tasks.episode import LYING, STANDING, EpisodeState
 from getup_jax.tasks.getup import GetUpTask
 
@@ -95,13 +96,13 @@ class Roller:
         world: Any,
         getup: jax.Array,
         row: jax.Array,
-        scale: jax.Array,
+        curve: Curve,
         region: jax.Array | None,
     ) -> Carry:
         """Fresh episodes [B]; see `Plan`."""
         env, size = self.env, len(getup)
         kind = jnp.full(size, self.kind, jnp.int32)
-        state = env.start(world, getup, kind, row, scale, region)
+        state = env.start(world, getup, kind, row, curve, region)
         hinges = env.character.num_joints
         return Carry(state, jnp.ones(size, bool), jnp.full((2, size, hinges), jnp.nan, jnp.float32))
 
@@ -127,7 +128,7 @@ class Roller:
         limit = jnp.asarray(env.character.torque_limit, jnp.float32)
         return Trace(
             features=env.observer.posture(kinematics, world.terrain).features,
-            target=env.targets(world, state)[:, 0],
+            target=env.targets(state)[:, 0],
             time=state.time,
             duration=state.duration,
             qpos=kinematics.qpos,
@@ -152,7 +153,7 @@ def run_episodes(
     options = env.engine.compiler_options
     start = jax.jit(roller.start, compiler_options=options)
     advance = jax.jit(roller.advance, compiler_options=options)
-    episodes, parts = len(plan.getup), []
+    episodes, parts, curves = len(plan.getup), [], plan_curves(task, plan)
     size = math.ceil(episodes / math.ceil(episodes / BATCH))
     most = episode_steps(task, plan)
     for first in range(0, episodes, size):
@@ -160,8 +161,8 @@ def run_episodes(
         index = np.minimum(np.arange(first, first + size), episodes - 1)
         keep = min(size, episodes - first)
         region = None if plan.region is None else plan.region[index]
-        starts = (plan.getup[index], plan.row[index], plan.duration_scale[index])
-        carry = start(task.world, *starts, region)
+        curve = jax.tree.map(lambda x, index=index: x[index], curves)
+        carry = start(task.world, plan.getup[index], plan.row[index], curve, region)
         chunks = []
         for chunk in _chunks(task, advance, policy, carry, plan.impulse[index]):
             chunks.append(jax.tree.map(lambda x, keep=keep: x[:, :keep], chunk))
@@ -171,10 +172,16 @@ def run_episodes(
     return Episodes(task, plan, _join(parts))
 
 
+def plan_curves(task: BuiltTask, plan: Plan) -> Curve:
+    """What the plan's episodes [N] follow."""
+    own = style_curve(task.world, jnp.asarray(plan.getup))
+    points = own.points if plan.points is None else jnp.asarray(plan.points)
+    return Curve(points=points, duration=own.duration * plan.duration_scale)
+
+
 def episode_steps(task: BuiltTask, plan: Plan) -> int:
     """Control steps of the longest of the plan's episodes."""
-    duration = np.asarray(task.world.duration)[plan.getup] * plan.duration_scale
-    rise = float(duration.max()) if plan.kind == LYING else 0.0
+    rise = float(plan_curves(task, plan).duration.max()) if plan.kind == LYING else 0.0
     total = rise + task.environment.config.stand_time_s
     return math.ceil(total / task.environment.engine.control_dt)
 

@@ -10,6 +10,7 @@ from tiny_task import LATENT, untrained_prior
 
 from getup_jax.motion import curves
 from getup_jax.nets import prior as pose_prior
+from getup_jax.tasks.drawn_curves import style_curve
 from getup_jax.tasks.episode import CLIP, LYING, STANDING, EpisodeState
 
 B = 4
@@ -117,7 +118,7 @@ def test_a_standing_start_is_at_the_end_of_its_curve(jitted):
     world = jitted.world
     np.testing.assert_array_equal(state.time, state.duration)
     np.testing.assert_allclose(state.duration, 2.0)
-    now = np.asarray(jitted.task.targets(world, state))
+    now = np.asarray(jitted.task.targets(state))
     end = np.broadcast_to(world.points[CURVE_STYLE, -1], now.shape)
     np.testing.assert_allclose(now, end, atol=1e-5)
     assert now.shape == (B, 4, 3)
@@ -126,7 +127,7 @@ def test_a_standing_start_is_at_the_end_of_its_curve(jitted):
 def test_a_lying_start_is_at_the_start_of_its_curve(jitted):
     state = jitted.start(LYING)
     np.testing.assert_array_equal(state.time, 0.0)
-    now = np.asarray(jitted.task.targets(jitted.world, state))
+    now = np.asarray(jitted.task.targets(state))
     np.testing.assert_allclose(now[:, 0], np.tile(jitted.world.points[0, 0], (B, 1)), atol=1e-5)
     # 300 ms of a straight line of 1 s
     ahead = np.asarray(0.7 * jitted.world.points[0, 0] + 0.3 * jitted.world.points[0, -1])
@@ -136,7 +137,9 @@ def test_a_lying_start_is_at_the_start_of_its_curve(jitted):
 
 def test_a_scaled_duration_stretches_the_episode(jitted):
     kind, row = jnp.full(B, STANDING), jnp.arange(B)
-    slow = jitted.start_rows(jitted.world, jnp.zeros(B, int), kind, row, 2.0)
+    own = style_curve(jitted.world, jnp.zeros(B, int))
+    twice = own.replace(duration=2.0 * own.duration)
+    slow = jitted.start_rows(jitted.world, jnp.zeros(B, int), kind, row, twice)
     np.testing.assert_allclose(slow.duration, 2.0)
     np.testing.assert_allclose(slow.time, 2.0)
 
@@ -146,7 +149,7 @@ def test_the_first_observation_has_the_action_and_the_targets(jitted):
     where = jitted.task.observer.slices()
     assert state.observation.shape == (B, 352)
     np.testing.assert_array_equal(state.observation[:, where["action"]], state.action)
-    targets = jitted.task.targets(jitted.world, state).reshape(B, 12)
+    targets = jitted.task.targets(state).reshape(B, 12)
     np.testing.assert_allclose(state.observation[:, where["targets"]], targets, atol=1e-6)
 
 

@@ -57,6 +57,13 @@ class TaskConfig:
     # ground in regions where more fails
     focus: float = number(0.0, least=0, below=1)
     focus_even: bool = False  # as often for a style with one part at the frontier as with ten
+    # share of the training episodes whose curves are drawn: blends of styles that start alike,
+    # their control points moved by smooth noise, over other durations; see tasks/drawn_curves.py
+    drawn_share: float = number(0.0, least=0, most=1)
+    # of drawn curves; 1: rms of .08 m, 10 degrees (side), 12 (front)
+    curve_noise: float = number(1.0, least=0, most=10)
+    # of drawn curves: T x U(low, high)
+    duration_range: tuple[float, float] = number((0.75, 1.3), above=0, most=100, length=2)
     start_noise_rad: float = number(0.0, least=0, most=math.pi)  # joint noise of the start poses
     pool_size: int = number(2048, least=1, most=1_000_000)  # start states made once
     # lying starts rest this long before the pool keeps them
@@ -76,6 +83,9 @@ class TaskConfig:
         require(share <= 1, "task.stand_start + task.clip_start", "at most 1", share)
         ok = self.assist == 0 or self.focus > 0
         require(ok, "task.focus", "more than 0 where task.assist is", self.focus)
+        low, high = self.duration_range
+        expected = "two numbers, the smaller one first"
+        require(low <= high, "task.duration_range", expected, self.duration_range)
         now = self.lookahead_s[:1] == (0.0,)
         require(now, "task.lookahead_s", "times that start with 0, the present", self.lookahead_s)
         drops = ("limp", "any", "paper")

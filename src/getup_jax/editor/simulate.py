@@ -26,6 +26,7 @@ from getup_jax.nets import prior as pose_prior
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.scores import episode_values
 from getup_jax.tasks.build import BuiltTask, build_task
+from getup_jax.tasks.drawn_curves import Curve
 from getup_jax.tasks.episode import LYING
 
 _POOL = 416  # start states on irregular ground: eight places a region for thirteen starts
@@ -115,14 +116,14 @@ class Simulator:
         are of the episode alone. Stop between two chunks by no longer asking.
         """
         getup = curve.getups()[0]
-        world = self.task.world.replace(
-            pool=self.starts.pool(curve, place),
+        world = self.task.world.replace(pool=self.starts.pool(curve, place))
+        zero = np.zeros(1, np.int32)
+        followed = Curve(
             points=jnp.asarray(getup.points[None], jnp.float32),
             duration=jnp.asarray([getup.duration], jnp.float32),
         )
-        zero, scale = np.zeros(1, np.int32), np.ones(1, np.float32)
         region = None if self.starts.places == 0 else np.full(1, place.region, np.int32)
-        carry = self.start(world, zero, zero, scale, region)
+        carry = self.start(world, zero, zero, followed, region)
         traces, parts, total = [], [], self.steps(curve)
         for first in range(0, total, CHUNK):
             carry, trace = self.advance(world, self.policy, carry)

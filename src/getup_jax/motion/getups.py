@@ -24,7 +24,7 @@ from getup_jax.physics.character import CharacterSpec
 # JAX compiles once for each shape, so that frames travel in blocks of one size.
 _BLOCK = 256
 _SAMPLES = 512
-_FLAT_M = 0.16  # the neck is .11 m high on a body that lies flat, and .22 m with the head raised
+FLAT_M = 0.16  # the neck is .11 m high on a body that lies flat, and .22 m with the head raised
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +77,7 @@ def _even(values: np.ndarray) -> np.ndarray:
 def flat_time(getup: GetUp) -> float:
     """Seconds for which the curve asks for a body so low that its head is on the floor."""
     height = curves.evaluate(jnp.asarray(getup.points), jnp.linspace(0.0, 1.0, _SAMPLES))[:, 0]
-    return getup.duration * float(jnp.mean(height < _FLAT_M))
+    return getup.duration * float(jnp.mean(height < FLAT_M))
 
 
 def find_getups(

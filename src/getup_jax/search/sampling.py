@@ -134,7 +134,7 @@ class Sampler:
         """[B]; 1 is a gap of FEATURE_SCALE between the body and the curves."""
         kinematics = state.physics.kinematics
         value = self.env.observer.posture(kinematics, world.terrain).features
-        gap = jnp.abs(value - self.env.targets(world, state)[:, 0]) / FEATURE_SCALE
+        gap = jnp.abs(value - self.env.targets(state)[:, 0]) / FEATURE_SCALE
         links = kinematics.link_position
         apart = distance(links, jnp.broadcast_to(now.links, links.shape)) / _POSE_SCALE_M
         return jnp.where(kinematics.finite, gap.sum(axis=-1) + pose * now.trust * apart, _FAILED)

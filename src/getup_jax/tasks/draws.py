@@ -1,4 +1,4 @@
-"""What new episodes start from while training: kind of start, style, row of the pool, length."""
+"""What new episodes start from while training: kind, style, row of the pool, length, curve."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ import jax.numpy as jnp
 
 from getup_jax.config import TaskConfig
 from getup_jax.tasks import curriculum, focus
+from getup_jax.tasks.drawn_curves import Curve, Library, draw_curves
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 from getup_jax.tasks.reset_pool import Pool
+
+_CURVES = 99  # folded into a key that is also split: none of its parts, which are 0, 1, 2, ...
 
 
 class Draw(NamedTuple):
@@ -23,6 +26,7 @@ class Draw(NamedTuple):
     region: jax.Array | None = None  # [B] int32; None on a flat plane
     lasts: jax.Array | None = None  # [B] s at most, inf: to the end; None: all of them are
     helped: jax.Array | None = None  # [B] bool, with the helping hand; None: there is none
+    curve: Curve | None = None  # None: those of the styles
 
 
 def whole_episodes(config: TaskConfig) -> TaskConfig:
@@ -38,20 +42,16 @@ def whole_episodes(config: TaskConfig) -> TaskConfig:
         limp_share=0.0,
         drop_as="limp",
         fallen_share=0.0,
+        drawn_share=0.0,
     )
 
 
-class Starts(Protocol):
+class Starts(Library, Protocol):
     """The part of the task's world that draws need."""
 
     @property
     def pool(self) -> Pool:
         """The start states."""
-        ...
-
-    @property
-    def duration(self) -> jax.Array:
-        """[G] s."""
         ...
 
 
@@ -67,6 +67,7 @@ def draw_starts(
     """Starts of B = num_envs episodes; learned is the focus of `focus.py`, None: even draws.
 
     levels are those of `assist.py`: starts with the hand are drawn where it is about to let go.
+    Their curves are those of the styles, see `with_curves`.
     """
     key_place, key_style, key_row, key_short, key_help = jax.random.split(key, 5)
     kind, region = _places(config, key_place, num_envs, progress)
@@ -108,6 +109,20 @@ def draw_starts(
         getup = startable.styles[region, place]
     row = jax.random.randint(key_row, (num_envs,), 0, rows)
     return Draw(getup, kind, row, region, lasts)
+
+
+def with_curves(
+    config: TaskConfig, world: Library, key: jax.Array, drawn: Draw, first: jax.Array | int = 0
+) -> Draw:
+    """The starts with the share of drawn curves that is asked for.
+
+    key is that of the starts, and `first` the number of their first one in the batch: so the
+    starts do not depend on the setting, and curves cost only as many rows as begin.
+    """
+    if config.drawn_share == 0:
+        return drawn
+    key_curve = jax.random.fold_in(jax.random.fold_in(key, _CURVES), first)
+    return drawn._replace(curve=draw_curves(config, world, key_curve, drawn.getup, drawn.kind))
 
 
 def _places(

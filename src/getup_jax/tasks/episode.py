@@ -57,6 +57,7 @@ class EpisodeState:
     getup: jax.Array  # [B] int32, index of the style
     kind: jax.Array  # [B] int32, LYING, STANDING or CLIP
     time: jax.Array  # [B] s since the curve's start, t - t0 of equation 1
+    points: jax.Array  # [B, 9, 3] control points of the curves: m, rad, rad
     duration: jax.Array  # [B] s, T
     low_steps: jax.Array  # [B] int32, steps in a row with a low task reward
     head_steps: jax.Array  # [B] int32, steps in a row with the head on the floor

@@ -17,7 +17,8 @@ from getup_jax.rotation import angle, conjugate, multiply
 from getup_jax.rows import replace_rows
 from getup_jax.tasks import assist, curriculum, early_ends, focus, practice, rewards
 from getup_jax.tasks.actions import Units
-from getup_jax.tasks.draws import Draw, draw_starts
+from getup_jax.tasks.drawn_curves import Curve, style_curve
+from getup_jax.tasks.draws import Draw, draw_starts, with_curves
 from getup_jax.tasks.episode import (
     EpisodeState,
     Record,
@@ -80,6 +81,7 @@ class GetUpTask:
             levels = jnp.ones_like(learned)
         progress = None if self.terrain is None else curriculum.first(self.terrain)
         drawn = draw_starts(self.config, world, key_start, num_envs, learned, progress, levels)
+        drawn = with_curves(self.config, world, key_start, drawn)
         state = self._begin(world, drawn, levels)
         return state.replace(key=key_state, focus=learned, assist=levels, curriculum=progress)
 
@@ -105,12 +107,11 @@ class GetUpTask:
 
         def fresh(index: jax.Array) -> EpisodeState:
             picked = jax.tree.map(lambda x: x[index], drawn)
+            picked = with_curves(self.config, world, key_reset, picked, index[0])
             begun = self._begin(world, picked, levels).replace(key=None)
             if state.until is None or begun.until is not None:
-                return begun
-            return begun.replace(
-                until=jnp.full_like(begun.time, jnp.inf)
-            )  # the first ones were cut
+                return begun  # episodes are cut short, or none is
+            return begun.replace(until=jnp.full_like(begun.time, jnp.inf))  # only first ones are
 
         done = output.terminated | output.truncated
         # what belongs to the whole batch has no simulation axis and stays out of the rows
@@ -120,7 +121,9 @@ class GetUpTask:
         return after, output.replace(observation=after.observation)
 
     def _begin(self, world: World, drawn: Draw, levels: jax.Array | None) -> EpisodeState:
-        state = self.start(world, drawn.getup, drawn.kind, drawn.row, region=drawn.region)
+        state = self.start(
+            world, drawn.getup, drawn.kind, drawn.row, curve=drawn.curve, region=drawn.region
+        )
         if drawn.lasts is not None:
             state = state.replace(until=state.time + drawn.lasts)
         if drawn.helped is None or levels is None:
@@ -135,24 +138,28 @@ class GetUpTask:
         getup: jax.Array,
         kind: jax.Array,
         row: jax.Array,
-        duration_scale: jax.Array | float = 1.0,
+        curve: Curve | None = None,
         region: jax.Array | None = None,
     ) -> EpisodeState:
         """Episodes of the given styles [B], kinds of start [B] and rows [B] of the pool.
 
+        curve: what they follow, with starts along it at the same phase; None: that of their style.
         region [B]: where on irregular ground; None is the first one, as on a flat plane.
         """
         index = world.pool.table[kind, 0 if region is None else region, getup, row]
         physics = take(world.pool.physics, index)
         size = len(getup)
+        own = style_curve(world, getup)
+        curve = own if curve is None else curve
         state = EpisodeState(
             physics=physics,
             observation=jnp.zeros((size, self.observation_size), jnp.float32),
             action=jnp.zeros((size, self.action_size), jnp.float32),
             getup=getup,
             kind=kind,
-            time=world.pool.time[index] * duration_scale,
-            duration=world.duration[getup] * duration_scale,
+            time=world.pool.time[index] * (curve.duration / own.duration),
+            points=curve.points,
+            duration=curve.duration,
             low_steps=jnp.zeros(size, jnp.int32),
             head_steps=jnp.zeros(size, jnp.int32),
             record=Record.empty(size),
@@ -162,16 +169,16 @@ class GetUpTask:
         )
         # The filter keeps most of the last action, so the first target must be the start pose.
         angles = physics.kinematics.qpos[:, 7:]
-        condition, units = self.targets(world, state)[:, 0], self.units(world)
+        condition, units = self.targets(state)[:, 0], self.units(world)
         if self.terrain is None:
-            own = units.nearest(angles, condition)
+            hold = units.nearest(angles, condition)
         else:  # the prior knows no feet turned to a slope: without offsets, they would push it over
-            own = units.action(angles, angles, condition)
+            hold = units.action(angles, angles, condition)
         if world.pool.action is not None:
             given = world.pool.action[index]
-            own = jnp.where(jnp.isnan(given), own, given)
-        state = state.replace(action=own)
-        return state.replace(observation=self._observe(world, state, self._posture(world, state)))
+            hold = jnp.where(jnp.isnan(given), hold, given)
+        state = state.replace(action=hold)
+        return state.replace(observation=self._observe(state, self._posture(world, state)))
 
     def advance(
         self, world: World, state: EpisodeState, action: jax.Array
@@ -184,7 +191,7 @@ class GetUpTask:
             physics=physics, action=filtered, time=state.time + self.engine.control_dt
         )
         posture = self._posture(world, state)
-        target = self.targets(world, state)[:, 0]
+        target = self.targets(state)[:, 0]
         terms = self._reward_terms(world, state, posture, target)
         finite = physics.kinematics.finite
         terms = {name: jnp.where(finite, value, 0.0) for name, value in terms.items()}
@@ -200,8 +207,8 @@ class GetUpTask:
         if state.until is not None:
             end = jnp.minimum(end, state.until - half_step)
         truncated = ~terminated & (state.time > end)
-        state = self._record(world, state, posture, target, terms["task"])
-        observation = jnp.where(finite[:, None], self._observe(world, state, posture), 0.0)
+        state = self._record(state, posture, target, terms["task"])
+        observation = jnp.where(finite[:, None], self._observe(state, posture), 0.0)
         state = state.replace(observation=observation)
         metrics = {f"reward_{name}": value for name, value in terms.items()}
         metrics |= {f"ended_{name}": value.astype(jnp.float32) for name, value in causes.items()}
@@ -230,7 +237,7 @@ class GetUpTask:
         if state.lift is None:
             return None
         measured = state.observation[:, self.observer.slices()["features"]]
-        target = self.targets(world, state)[:, 0]
+        target = self.targets(state)[:, 0]
         kinematics = state.physics.kinematics
         normal = world.terrain.normal(kinematics.qpos[:, :2])
         held = state.record.steps * self.engine.control_dt < self.config.assist_s
@@ -239,7 +246,7 @@ class GetUpTask:
 
     def servo_target(self, world: World, state: EpisodeState, filtered: jax.Array) -> jax.Array:
         """Hinge targets [B, J]: q = decoder(z, c) + dq [P 3.4], c the curve values now."""
-        target = self.units(world).target(filtered, self.targets(world, state)[:, 0])
+        target = self.units(world).target(filtered, self.targets(state)[:, 0])
         return jnp.clip(target, world.target_lower, world.target_upper)
 
     def units(self, world: World) -> Units:
@@ -253,24 +260,23 @@ class GetUpTask:
             return None
         return jnp.zeros_like(getup) if region is None else region
 
-    def targets(self, world: World, state: EpisodeState) -> jax.Array:
+    def targets(self, state: EpisodeState) -> jax.Array:
         """Curve values [B, n, 3] at the look-ahead times; the first one is now."""
         ahead = jnp.asarray(self.config.lookahead_s, jnp.float32)
         s = (state.time[:, None] + ahead) / state.duration[:, None]
-        points = world.points[state.getup]
-        return curves.evaluate(points[:, None], s)
+        return curves.evaluate(state.points[:, None], s)
 
     def _posture(self, world: World, state: EpisodeState) -> Posture:
         return self.observer.posture(state.physics.kinematics, world.terrain)
 
-    def _observe(self, world: World, state: EpisodeState, posture: Posture) -> jax.Array:
-        return self.observer.observe(posture, self.targets(world, state), state.action)
+    def _observe(self, state: EpisodeState, posture: Posture) -> jax.Array:
+        return self.observer.observe(posture, self.targets(state), state.action)
 
     def _reward_terms(
         self, world: World, state: EpisodeState, posture: Posture, target: jax.Array
     ) -> dict[str, jax.Array]:
         value = posture.features
-        alpha = rewards.phase(target[:, 0], world.points[state.getup, -1, 0])
+        alpha = rewards.phase(target[:, 0], state.points[:, -1, 0])
         joint_error = angle(multiply(conjugate(world.neutral_rotation), posture.joint_rotation))
         omega = posture.link_angular_velocity.reshape(len(alpha), -1)
         offset = self.config.offset_scale * state.action[:, self.latent_size :]
@@ -289,7 +295,6 @@ class GetUpTask:
 
     def _record(
         self,
-        world: World,
         state: EpisodeState,
         posture: Posture,
         target: jax.Array,
@@ -300,7 +305,7 @@ class GetUpTask:
             state.record,
             posture.features,
             target,
-            world.points[state.getup, -1, 0],
+            state.points[:, -1, 0],
             time_left,
             state.time > state.duration,
             task_reward,

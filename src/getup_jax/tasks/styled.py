@@ -17,6 +17,7 @@ from getup_jax import rotation
 from getup_jax.config import CompositeConfig, Config, ConfigError
 from getup_jax.motion.named_clips import named_clips
 from getup_jax.tasks.build import BuiltTask
+from getup_jax.tasks.drawn_curves import Curve
 from getup_jax.tasks.episode import EpisodeState
 from getup_jax.tasks.getup import GetUpTask, World
 from getup_jax.tasks.groups import Group, objective_weights, resolve_groups
@@ -57,11 +58,11 @@ class StyledGetUp(GetUpTask):
         getup: jax.Array,
         kind: jax.Array,
         row: jax.Array,
-        duration_scale: jax.Array | float = 1.0,
+        curve: Curve | None = None,
         region: jax.Array | None = None,
     ) -> EpisodeState:
         """See `GetUpTask.start`; the frames before the start go on with its velocities."""
-        state = super().start(world, getup, kind, row, duration_scale, region)
+        state = super().start(world, getup, kind, row, curve, region)
         if not self.groups:
             return state
         return state.replace(history=self._before(state.physics.kinematics))
