@@ -15,6 +15,7 @@ from typing import Any
 import yaml
 
 from getup_jax.config import Config, ConfigError
+from getup_jax.config.earlier import completed
 from getup_jax.convert import Text, describe, section
 from getup_jax.paths import config_path, shipped_configs
 
@@ -22,10 +23,11 @@ from getup_jax.paths import config_path, shipped_configs
 def load_config(path: str | Path | None, overrides: Sequence[str] = ()) -> Config:
     """The defaults, changed by a YAML file (None: by none) and then by overrides.
 
+    A key that a saved config lacks means what was so when it was saved, see config/earlier.py.
     Raises ConfigError that names the key, or the file and line.
     """
     file = None if path is None else find_config(path)
-    from_file = {} if file is None else _read_yaml(file)
+    from_file = {} if file is None else completed(_read_yaml(file))
     try:
         merged = functools.reduce(_merge, map(_parse_override, overrides), from_file)
         return section(merged, Config, "", None)

@@ -108,6 +108,8 @@ class Environment(Protocol):
 
     An observation may start with a history of frames. The environment then has `frames`, their
     number F and size I, and the first F * I numbers are the frames, the oldest one first.
+
+    One that has a mirror image has `symmetry`, which says what is mirrored how; see mirror.py.
     """
 
     @property

@@ -93,7 +93,7 @@ class Learner:
             wait = state.iteration < self.config.critic_first
             improved = _critic_only(wait, learner, improved)
         learner = _unless_first(learner, improved)
-        policy = observe(learner.policy, collected.transition.observation)
+        policy = observe(learner.policy, collected.transition.observation, self.model.symmetry)
         metrics |= {
             "ppo/explained_variance": explained,
             "ppo/learning_rate": stage.learning_rate,
@@ -258,7 +258,7 @@ def make_learner(
         raise ValueError(f"weights: expected {count} of at least 0, not all 0, got {weights}")
     return Learner(
         env=env,
-        model=make_actor_critic(env, network_config),
+        model=make_actor_critic(env, network_config, ppo_config.normalize_observation),
         config=ppo_config,
         weights=tuple(w / math.fsum(weights) for w in weights),
         total_steps=total_steps,

@@ -13,6 +13,9 @@ class NetworkConfig:
 
     hidden_sizes: tuple[int, ...] = (256, 256)
     activation: str = "relu"  # relu | tanh | elu | silu | relu6
+    # what is done in the mirror image of a state is the mirror image of what is done in the state,
+    # by construction; where the task has a mirror image, which composite motion has not
+    mirror: bool = True
     gru_size: int = 256  # GRU in front of both, where the task observes a history of frames
     # first std of actions that the actor gives for each state; None: ppo.action_std for all
     initial_std: float | None = None

@@ -124,6 +124,7 @@ class PriorConfig:
     conditional: bool = True  # False: the standard pose VAE, for the ablation
     latent_size: int = 16
     hidden_sizes: tuple[int, ...] = (256, 256)
+    mirror: bool = True  # equivariant: the image of a latent decodes to the image of its pose
     beta: float = 1e-6  # weight of the KL term
     learning_rate: float = 1e-4
     last_rate: float = 1.0  # share of it at the end, reached along a half cosine; 1: constant
