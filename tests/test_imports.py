@@ -14,7 +14,7 @@ PACKAGE = Path(getup_jax.__file__).parent
 
 # From left to right; a name is a module or a sub-package of getup_jax.
 LAYERS = [
-    ["types", "config", "rotation", "rows"],
+    ["types", "config", "rotation", "rows", "mirror"],
     ["convert", "paths", "settings", "yaml_text"],
     ["storage", "manifest", "checkpoint", "metrics", "progress", "journal", "runfolder", "stop"],
     ["physics", "nets", "motion"],

@@ -12,7 +12,7 @@ from tiny_task import untrained_prior
 from eval_samples import SMALL, make_policy, make_task
 from getup_jax import lessons, transfer
 from getup_jax.tasks.actions import Units
-from getup_jax.transfer import carry_over
+from getup_jax.transfer import Origin, carry_over
 
 KEY = jax.random.PRNGKey(0)
 CONFIG = dataclasses.replace(
@@ -63,7 +63,9 @@ def test_the_latent_is_that_of_the_old_pose_and_not_of_the_offsets(task, old):
 def test_an_action_that_means_the_same_leaves_the_policy_alone(task):
     learner, policy = make_policy(task, CONFIG)
     settings, log = CONFIG.task, []
-    same = carry_over(learner, task.world, policy, settings, task.world.prior, KEY, log.append)
+    same = carry_over(
+        learner, task.world, policy, Origin(settings, task.world.prior), KEY, log.append
+    )
     assert same is policy
     assert log == []
 
@@ -75,7 +77,7 @@ def test_the_actor_learns_the_old_targets(task, old, monkeypatch):
     learner, policy = make_policy(task, CONFIG)
     settings = dataclasses.replace(CONFIG.task, offset_scale=old.offset_scale)
     log: list[str] = []
-    taught = carry_over(learner, task.world, policy, settings, old.prior, KEY, log.append)
+    taught = carry_over(learner, task.world, policy, Origin(settings, old.prior), KEY, log.append)
     after, before, _ = (float(word) for word in log[-1].split() if word[0].isdigit())
     assert after < 0.3 * before
     block = learner.env.observer.slices()["action"]
@@ -98,7 +100,7 @@ def test_offsets_are_avoided_where_latents_can_say_the_same(task, monkeypatch):
         log: list[str] = []
         settings = dataclasses.replace(CONFIG.task, offset_scale=0.5)
         prior = untrained_prior(task.environment.character, seed=0)
-        carry_over(learner, task.world, policy, settings, prior, KEY, log.append)
+        carry_over(learner, task.world, policy, Origin(settings, prior), KEY, log.append)
         lengths.append(float(log[-1].split()[-2]))
     assert lengths[1] < 0.7 * lengths[0]
 

@@ -72,7 +72,7 @@ def rehearse(
         part = _play(learner, stage, policy, targets, key_play, own=number > 0, left=left)
         parts.append(part)
         if number == 0:
-            policy = observe(policy, jnp.asarray(part.observation))
+            policy = observe(policy, jnp.asarray(part.observation), learner.model.symmetry)
         before = _miss(learner, built.world, policy, part)
         everything = Rehearsed(*(np.concatenate(x) for x in zip(*parts, strict=True)))
         policy = _taught(learner, built.world, policy, everything, key_order)

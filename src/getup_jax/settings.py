@@ -17,6 +17,7 @@ import yaml
 from getup_jax import yaml_text
 from getup_jax.config import Config, ConfigError
 from getup_jax.config.check import shown
+from getup_jax.config.earlier import completed
 from getup_jax.convert import Text, describe, section
 from getup_jax.paths import config_path, shipped_configs
 
@@ -32,15 +33,16 @@ _DEEPEST = 10  # names in the key of an override
 def load_config(path: str | Path | None, overrides: Sequence[str] = ()) -> Config:
     """The defaults, changed by a YAML file (None: by none) and then by overrides.
 
+    A key that a saved config lacks means what was so when it was saved, see config/earlier.py.
     Raises ConfigError that names the key, or the file and line.
     """
     file = None if path is None else find_config(path)
-    return _build(file, {} if file is None else _read_yaml(file), overrides)
+    return _build(file, {} if file is None else completed(_read_yaml(file)), overrides)
 
 
 def load_saved_config(file: Path) -> Config:
     """What `dump_yaml` wrote, also of an earlier version with settings that are RETIRED now."""
-    values = _read_yaml(file)
+    values = completed(_read_yaml(file))
     for key in RETIRED:
         _remove(values, *key.split("."))
     return _build(file, values, ())

@@ -22,12 +22,10 @@ from getup_jax.config import Config
 from getup_jax.footing import teach_footing
 from getup_jax.loop import CarryOver, Job, Loop, TrainingError, num_iterations, steps_per_iteration
 from getup_jax.metrics import MetricsWriter, tensorboard_module
-from getup_jax.nets import prior as pose_prior
 from getup_jax.progress import Display, count, duration
 from getup_jax.rehearsal import Stage, rehearse
 from getup_jax.runfolder import prepare, resume_command
 from getup_jax.stop import StopRequest
-from getup_jax.storage import CheckpointError
 from getup_jax.tasks.build import build_task
 from getup_jax.tasks.build_composite import BuiltComposite, build_composite
 from getup_jax.tasks.episode import with_shared
@@ -54,19 +52,17 @@ def build_job(config: Config, log: Log) -> Job:
         total_steps=config.train.total_steps,
         objectives=objectives,
     )
-    carry_over = None if task.prior is None else _carry_over(learner, task.world, config.seed)
+    carry_over = _carry_over(learner, task.world, config)
     return Job(learner, task.world, task.prior, carry_over, share=with_shared)
 
 
-def _carry_over(learner: Learner, world: World, seed: int) -> CarryOver:
+def _carry_over(learner: Learner, world: World, config: Config) -> CarryOver:
     def carry_over(policy: PolicyState, loaded: LoadedPolicy, log: Log) -> PolicyState:
-        if loaded.prior is None:
-            raise CheckpointError(
-                f"train.init_from: {loaded.path}: was trained without a pose prior, this run has "
-                "one; set prior: null, or start from another policy"
-            )
-        prior, key = pose_prior.from_dict(loaded.prior), jax.random.PRNGKey(seed)
-        policy = transfer.carry_over(learner, world, policy, loaded.config.task, prior, key, log)
+        origin = transfer.origin(learner, world, loaded, config.train.init_learner)
+        if world.prior is None:
+            return policy
+        key = jax.random.PRNGKey(config.seed)
+        policy = transfer.carry_over(learner, world, policy, origin, key, log)
         if learner.env.terrain is None or loaded.config.terrain is not None:
             return policy
         return teach_footing(learner, world, policy, key, log)

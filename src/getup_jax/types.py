@@ -111,6 +111,8 @@ class Environment(Protocol):
 
     It may have `stagger(state, key) -> state`: fresh episodes made to end at different times. A
     training begins with it, so that its episodes do not run in lockstep.
+
+    One that has a mirror image has `symmetry`, which says what is mirrored how; see mirror.py.
     """
 
     @property

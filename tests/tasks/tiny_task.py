@@ -15,6 +15,7 @@ from getup_jax.nets.mlp import OUTPUT_LAYER
 from getup_jax.nets.prior import PosePrior
 from getup_jax.nets.prior_data import pose_conditions
 from getup_jax.physics.character import CharacterSpec
+from getup_jax.physics.mirror_image import joint_mirror
 from getup_jax.tasks.build import BuiltTask, assemble
 
 LATENT = 16
@@ -48,9 +49,9 @@ def getups(character: CharacterSpec) -> list[GetUp]:
     ]
 
 
-def untrained_prior(character: CharacterSpec, seed: int = 0) -> PosePrior:
+def untrained_prior(character: CharacterSpec, seed: int = 0, mirrored: bool = False) -> PosePrior:
     """A pose prior with random weights."""
-    model = CVAE(num_joints=character.num_joints, latent_size=LATENT, hidden_sizes=(32,))
+    model = CVAE(character.num_joints, LATENT, hidden_sizes=(32,), mirrored=mirrored)
     rng = np.random.default_rng(seed)
     angles = character.neutral_qpos[7:] + 0.1 * rng.normal(size=(64, 49))
     variables = init_variables(
@@ -58,10 +59,14 @@ def untrained_prior(character: CharacterSpec, seed: int = 0) -> PosePrior:
         jax.random.PRNGKey(seed),
         jnp.asarray(angles, jnp.float32),
         jnp.asarray(rng.normal(size=(64, 3)), jnp.float32),
+        joint_mirror(character) if mirrored else None,
     )
+    latent_mean = rng.normal(size=LATENT)
+    if mirrored:
+        latent_mean[LATENT // 2 :] = 0.0
     return PosePrior(
         variables=variables,
-        latent_mean=jnp.asarray(rng.normal(size=LATENT), jnp.float32),
+        latent_mean=jnp.asarray(latent_mean, jnp.float32),
         latent_std=jnp.asarray(rng.uniform(0.5, 2.0, LATENT), jnp.float32),
         joint_lower=jnp.asarray(character.joint_lower, jnp.float32),
         joint_upper=jnp.asarray(character.joint_upper, jnp.float32),

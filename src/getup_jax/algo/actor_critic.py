@@ -1,4 +1,9 @@
-"""The actor and the critic with the normalisation around them."""
+"""The actor and the critic with the normalisation around them.
+
+Where the environment has a mirror image M, both are equivariant by construction: each of the
+networks f is averaged over an observation and its image, (f(o) + M f(M o)) / 2, and what the
+observations are normalised by are the statistics of both together.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +19,7 @@ from getup_jax.algo import normalize, popart
 from getup_jax.algo.state import LearnerState, PolicyState
 from getup_jax.algo.update import ACTOR_EPSILON, first_scale, make_optimiser
 from getup_jax.config import NetworkConfig, PPOConfig
+from getup_jax.mirror import SignedPermutation, Symmetry, concatenated, signed
 from getup_jax.nets.mlp import MLP
 from getup_jax.nets.recurrent import HistoryMLP
 from getup_jax.types import Environment
@@ -42,6 +48,8 @@ class ActorCritic:
     std_range: float = 2.0  # bounds of the actor's log std, in e-folds around the first one
     # A where the observation ends in a meta policy's action, which only the mean gets, else 0
     meta_size: int = 0
+    symmetry: Symmetry | None = None  # of raw observations; None: the networks as they are
+    normalized: bool = True  # whether the networks see normalised observations
 
     def init(self, key: jax.Array, config: PPOConfig) -> LearnerState:
         """Fresh variables, and the statistics that the settings ask for."""
@@ -53,7 +61,7 @@ class ActorCritic:
         normalized = config.normalize_observation
         statistics = normalize.initial(self.observation_size) if normalized else None
         return LearnerState(
-            policy=PolicyState(actor=actor, statistics=statistics),
+            policy=self.symmetric(PolicyState(actor=actor, statistics=statistics)),
             critic=critic,
             average=actor,
             actor_optimiser=optimiser.init(actor),
@@ -91,16 +99,44 @@ class ActorCritic:
         self, actor: Any, normalized: jax.Array
     ) -> tuple[jax.Array, jax.Array | None, jax.Array | None]:
         """The actor's own mean, log std and meta weight [..., A]; None where it has none."""
-        output: Any = self.actor.apply(actor, normalized[..., : self.observation_size])
         has_std, has_meta = self.initial_std is not None, self.meta_size > 0
+        image = None
+        if self.symmetry is not None:
+            action = self.symmetry.action
+            image = concatenated([action] + (has_std + has_meta) * [action.unsigned()])
+        output = self._apply(self.actor, actor, normalized, image)
         parts = jnp.split(output, 1 + has_std + has_meta, axis=-1)
         weight = nn.sigmoid(parts[-1] + META_LOGIT) if has_meta else None
         return parts[0], parts[1] if has_std else None, weight
 
     def output(self, critic: Any, normalized: jax.Array) -> jax.Array:
         """Critic outputs [..., K] in the critic's units for normalised observations [..., O]."""
-        output: Any = self.critic.apply(critic, normalized[..., : self.observation_size])
-        return output
+        image = None if self.symmetry is None else signed([1.0] * self.critic.output_size)
+        return self._apply(self.critic, critic, normalized, image)
+
+    def _apply(
+        self,
+        network: Network,
+        variables: Any,
+        normalized: jax.Array,
+        image: SignedPermutation | None,
+    ) -> jax.Array:
+        """Outputs [..., N] of a network, averaged over both images; `image` is the outputs'."""
+        seen: Any = normalized[..., : self.observation_size]
+        if self.symmetry is None or image is None:
+            output: Any = network.apply(variables, seen)
+            return output
+        mirror = self.symmetry.observation
+        mirror = mirror.linear() if self.normalized else mirror
+        both: Any = network.apply(variables, mirror.stacked(seen))
+        return image.averaged(both)
+
+    def symmetric(self, policy: PolicyState) -> PolicyState:
+        """The policy with statistics [O] of the observations and their mirror images."""
+        if self.symmetry is None or policy.statistics is None:
+            return policy
+        statistics = normalize.symmetric(policy.statistics, self.symmetry.observation)
+        return dataclasses.replace(policy, statistics=statistics)
 
     def value(self, learner: LearnerState, normalized: jax.Array) -> jax.Array:
         """Values [..., K] in return units for normalised observations [..., O]."""
@@ -108,9 +144,17 @@ class ActorCritic:
         return output if learner.popart is None else popart.denormalize(learner.popart, output)
 
 
-def make_actor_critic(env: Environment, config: NetworkConfig) -> ActorCritic:
-    """Networks of the sizes that the environment and the settings give."""
+def make_actor_critic(
+    env: Environment, config: NetworkConfig, normalized: bool = True
+) -> ActorCritic:
+    """Networks of the sizes that the environment and the settings give.
+
+    They are equivariant with `network.mirror` where the environment has a `symmetry`.
+
+    normalized: whether the observations are, `ppo.normalize_observation`.
+    """
     meta_size: int = getattr(env, "meta_size", 0)
+    symmetry: Symmetry | None = getattr(env, "symmetry", None)
     heads = 1 + (config.initial_std is not None) + (meta_size > 0)
     return ActorCritic(
         actor=_network(env, config, heads * env.action_size, ACTOR_OUTPUT_SCALE),
@@ -119,6 +163,8 @@ def make_actor_critic(env: Environment, config: NetworkConfig) -> ActorCritic:
         initial_std=config.initial_std,
         std_range=config.std_range,
         meta_size=meta_size,
+        symmetry=symmetry if config.mirror else None,
+        normalized=normalized,
     )
 
 
@@ -140,10 +186,14 @@ def normalized(policy: PolicyState, observation: jax.Array) -> jax.Array:
     return jnp.concatenate([seen, observation[..., size:]], axis=-1)
 
 
-def observe(policy: PolicyState, observation: jax.Array) -> PolicyState:
-    """The policy with raw observations [..., O] added to its statistics."""
+def observe(
+    policy: PolicyState, observation: jax.Array, symmetry: Symmetry | None = None
+) -> PolicyState:
+    """The policy with raw observations [..., O], and their images, added to its statistics."""
     if policy.statistics is None:
         return policy
     size = policy.statistics.mean.size
-    statistics = normalize.update(policy.statistics, observation[..., :size], MEMORY_STEPS)
+    mirror = None if symmetry is None else symmetry.observation
+    seen = observation[..., :size]
+    statistics = normalize.update(policy.statistics, seen, MEMORY_STEPS, mirror)
     return dataclasses.replace(policy, statistics=statistics)

@@ -91,7 +91,7 @@ class Learner:
         )
         learner, samples, explained = estimate(self.model, learner, transition, self.config)
         learner, metrics = self._improve(state.iteration, learner, samples, stage, key_update)
-        policy = observe(learner.policy, collected.transition.observation)
+        policy = observe(learner.policy, collected.transition.observation, self.model.symmetry)
         metrics |= {
             "ppo/explained_variance": explained,
             "ppo/learning_rate": stage.learning_rate,
@@ -244,7 +244,7 @@ def make_learner(
         raise ValueError(f"weights: expected {count} of at least 0, not all 0, got {weights}")
     return Learner(
         env=env,
-        model=make_actor_critic(env, network_config),
+        model=make_actor_critic(env, network_config, ppo_config.normalize_observation),
         config=ppo_config,
         weights=tuple(w / math.fsum(weights) for w in weights),
         total_steps=total_steps,

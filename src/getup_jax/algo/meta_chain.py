@@ -122,7 +122,7 @@ def _level(loaded: LoadedPolicy, task: CompositeTask, has_meta: bool) -> tuple[L
         goals=goals,
     )
     env: Any = MetaTask(own, ()) if has_meta else own
-    model = make_actor_critic(env, loaded.config.network)
+    model = make_actor_critic(env, loaded.config.network, loaded.config.ppo.normalize_observation)
     template = jax.eval_shape(
         lambda key: model.init(key, loaded.config.ppo).policy, jax.random.PRNGKey(0)
     )

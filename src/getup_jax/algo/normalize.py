@@ -21,6 +21,8 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from getup_jax.mirror import SignedPermutation
+
 # In standard deviations. Beyond it a value says only that something rare happened; unclipped, one
 # such input dominates every layer after it.
 CLIP = 10.0
@@ -81,14 +83,27 @@ def _add(mean: jax.Array, step: jax.Array) -> tuple[jax.Array, jax.Array]:
     return total, step - (total - mean)
 
 
-def update(moments: Moments, x: jax.Array, horizon: float = math.inf) -> Moments:
-    """The running moments with a batch x[..., O] added.
+def update(
+    moments: Moments,
+    x: jax.Array,
+    horizon: float = math.inf,
+    mirror: SignedPermutation | None = None,
+) -> Moments:
+    """The running moments with a batch x[..., O] added, and its images where there is a mirror.
 
     What was seen before counts for at most `horizon` samples: a longer run forgets, as a moving
     average does, and so follows what it is shown later.
     """
     before = moments.replace(count=jnp.minimum(moments.count, horizon))
-    return merge(before, moments_of(x, moments.mean))
+    batch = moments_of(x, moments.mean)
+    return merge(before, batch if mirror is None else symmetric(batch, mirror))
+
+
+def symmetric(moments: Moments, mirror: SignedPermutation) -> Moments:
+    """Moments of the samples and their mirror images together, which count as one."""
+    mean, variance = mirror.moments(moments.mean, moments.variance)
+    residue = 0.5 * (moments.residue + mirror.linear()(moments.residue))
+    return moments.replace(mean=mean, residue=residue, variance=variance)
 
 
 def normalize(moments: Moments, x: jax.Array, least_std: float = 0.0) -> jax.Array:

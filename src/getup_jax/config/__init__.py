@@ -60,6 +60,9 @@ class Config:
         ok = scale == default or self.network.initial_std is not None
         expected = f"{default} where network.initial_std is null; ppo.action_std sets the noise"
         require(ok, "ppo.std_scale", expected, scale)
+        unlike = self.network.mirror and self.prior is not None and not self.prior.mirror
+        expected = "false where prior.mirror is false, as its latents have no mirror images"
+        require(self.composite_motion or not unlike, "network.mirror", expected, True)
         if self.composite is None or not self.composite.groups:
             return
         flat = "null with composite motion or discriminators, which are on a plane"

@@ -125,6 +125,7 @@ class PriorConfig:
     conditional: bool = True  # False: the standard pose VAE, for the ablation
     latent_size: int = number(16, least=1, most=1024)
     hidden_sizes: tuple[int, ...] = number((256, 256), least=1, most=4096, length=(0, 8))
+    mirror: bool = True  # equivariant: the image of a latent decodes to the image of its pose
     beta: float = number(1e-6, least=0, most=1000)  # weight of the KL term
     learning_rate: float = number(1e-4, above=0, most=1)
     # share of it at the end, reached along a half cosine; 1: constant

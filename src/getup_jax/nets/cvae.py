@@ -4,6 +4,10 @@ Encoder and decoder are tanh perceptrons that both see the condition c = (h, the
 features of the pose. Angles and condition enter in rad and m and are standardised inside, by the
 training set's statistics; the decoder's output is scaled back the same way. So the networks see
 hinges of all ranges alike, while the loss is the paper's, in rad^2.
+
+A mirrored one is equivariant by construction. M is the mirror image, and S that of the latent:
+
+    encode(q, c) = (f(q, c) + S f(M q, M c)) / 2        decode(z, c) = (g(z, c) + M g(S z, M c)) / 2
 """
 
 from __future__ import annotations
@@ -16,6 +20,8 @@ import jax.numpy as jnp
 import numpy as np
 from flax import linen as nn
 
+from getup_jax import mirror
+from getup_jax.mirror import SignedPermutation
 from getup_jax.nets.mlp import OUTPUT_LAYER
 
 CONDITION_SIZE = 3  # height (m), side and front angle (rad)
@@ -49,9 +55,10 @@ class CVAE(nn.Module):
     latent_size: int  # Z
     hidden_sizes: tuple[int, ...]
     conditional: bool = True
+    mirrored: bool = False
 
     def setup(self) -> None:
-        """Both perceptrons, and the statistics [J] and [3] that travel with the parameters."""
+        """Both perceptrons, and what travels with the parameters: statistics, mirror image [J]."""
         self.encoder = TanhNetwork(self.hidden_sizes, 2 * self.latent_size)
         self.decoder = TanhNetwork(self.hidden_sizes, self.num_joints)
         self.angle_mean = self.variable("statistics", "angle_mean", jnp.zeros, self.num_joints)
@@ -60,6 +67,9 @@ class CVAE(nn.Module):
             "statistics", "condition_mean", jnp.zeros, CONDITION_SIZE
         )
         self.condition_std = self.variable("statistics", "condition_std", jnp.ones, CONDITION_SIZE)
+        if self.mirrored:
+            self.mirror_index = self.variable("mirror", "index", jnp.arange, self.num_joints)
+            self.mirror_sign = self.variable("mirror", "sign", jnp.ones, self.num_joints)
 
     def __call__(
         self, angles: jax.Array, condition: jax.Array, noise: jax.Array
@@ -71,14 +81,31 @@ class CVAE(nn.Module):
 
     def encode(self, angles: jax.Array, condition: jax.Array) -> tuple[jax.Array, jax.Array]:
         """Mean and log variance [..., Z] of angles [..., J] (rad), condition [..., 3]."""
+        if not self.mirrored:
+            return self._encode(angles, condition)
+        both = self._angle_mirror().stacked(angles), mirror.CURVE.stacked(condition)
+        mean, log_variance = self._encode(*both)
+        latent = mirror.latent(self.latent_size)
+        return latent.averaged(mean), latent.unsigned().averaged(log_variance)
+
+    def _encode(self, angles: jax.Array, condition: jax.Array) -> tuple[jax.Array, jax.Array]:
         standard = (angles - self.angle_mean.value) / self.angle_std.value
         mean, log_variance = jnp.split(self.encoder(self._join(standard, condition)), 2, axis=-1)
         return mean, log_variance
 
     def decode(self, latent: jax.Array, condition: jax.Array) -> jax.Array:
         """Angles [..., J] (rad) for latents [..., Z] and condition [..., 3]."""
+        if not self.mirrored:
+            return self._decode(latent, condition)
+        both = mirror.latent(self.latent_size).stacked(latent), mirror.CURVE.stacked(condition)
+        return self._angle_mirror().averaged(self._decode(*both))
+
+    def _decode(self, latent: jax.Array, condition: jax.Array) -> jax.Array:
         standard = self.decoder(self._join(latent, condition))
         return self.angle_mean.value + self.angle_std.value * standard
+
+    def _angle_mirror(self) -> SignedPermutation:
+        return SignedPermutation(self.mirror_index.value, self.mirror_sign.value)
 
     def _join(self, x: jax.Array, condition: jax.Array) -> jax.Array:
         if not self.conditional:
@@ -88,16 +115,38 @@ class CVAE(nn.Module):
 
 
 def init_variables(
-    model: CVAE, key: jax.Array, angles: jax.Array, condition: jax.Array
+    model: CVAE,
+    key: jax.Array,
+    angles: jax.Array,
+    condition: jax.Array,
+    angle_mirror: SignedPermutation | None = None,
 ) -> dict[str, Any]:
-    """Fresh parameters, with the statistics of training angles [N, J] and conditions [N, 3]."""
+    """Fresh parameters, with the statistics of training angles [N, J] and conditions [N, 3].
+
+    angle_mirror [J]: of a mirrored model; its statistics are of the poses and their images.
+    """
     statistics = {
-        "angle_mean": np.mean(angles, axis=0),
-        "angle_std": np.maximum(np.std(angles, axis=0), MIN_STD),
-        "condition_mean": np.mean(condition, axis=0),
-        "condition_std": np.maximum(np.std(condition, axis=0), MIN_STD),
+        **_moments("angle", angles, angle_mirror),
+        **_moments("condition", condition, mirror.CURVE if model.mirrored else None),
     }
-    return {**_init(model, key), "statistics": jax.tree.map(jnp.asarray, statistics)}
+    variables = {**_init(model, key), "statistics": jax.tree.map(jnp.asarray, statistics)}
+    if not model.mirrored:
+        return variables
+    if angle_mirror is None:
+        raise ValueError("angle_mirror: expected the hinges' mirror image for a mirrored model")
+    images = {"index": angle_mirror.index, "sign": angle_mirror.sign}
+    return {**variables, "mirror": jax.tree.map(jnp.asarray, images)}
+
+
+def _moments(
+    name: str, x: jax.Array, image: SignedPermutation | None
+) -> dict[str, np.ndarray | jax.Array]:
+    """Mean and standard deviation of x[N, I], with those of its images where there are some."""
+    mean, std = np.mean(x, axis=0), np.std(x, axis=0)
+    if image is not None:
+        mean, variance = image.moments(mean, std**2)
+        std = np.sqrt(variance)
+    return {f"{name}_mean": mean, f"{name}_std": np.maximum(std, MIN_STD)}
 
 
 @partial(jax.jit, static_argnames="model")

@@ -39,6 +39,11 @@ class PosePrior:
         """J."""
         return self.joint_lower.shape[-1]
 
+    @property
+    def mirrored(self) -> bool:
+        """Whether the mirror image of a latent decodes to the mirror image of its pose."""
+        return "mirror" in self.variables
+
 
 _FIELDS = tuple(field.name for field in dataclasses.fields(PosePrior))
 
@@ -90,6 +95,7 @@ def network(prior: PosePrior) -> CVAE:
         latent_size=prior.latent_size,
         hidden_sizes=tuple(hidden),
         conditional=inputs == prior.latent_size + CONDITION_SIZE,
+        mirrored=prior.mirrored,
     )
 
 

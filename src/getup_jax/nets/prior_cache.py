@@ -22,8 +22,8 @@ from getup_jax.nets.prior_training import PriorReport, train_prior
 # Raise it whenever the same poses and settings would give another prior, or the files change.
 FORMAT = 1
 
-# Settings that came later: at their defaults they leave the name of an older prior as it was.
-_LATER = ("last_rate", "weight_decay", "input_noise")
+# Settings that came later, and what older priors were made with: they keep their names.
+_LATER = {"last_rate": 1.0, "weight_decay": 0.0, "input_noise": 0.0, "mirror": False}
 
 _DECIMALS = 3  # of the statistics (rad, m) that tell one set of poses from another
 
@@ -64,11 +64,15 @@ def fingerprint(poses: PoseSet, config: PriorConfig) -> str:
     The statistics are rounded, since the last bits of a pose differ between processors, and a prior
     that is shipped must be found on all of them.
     """
-    settings = [FORMAT, _settings(config), poses.angles.shape]
+    image = poses.mirror if config.mirror else None
+    settings = [FORMAT, _settings(config, image is not None), poses.angles.shape]
     digest = hashlib.sha256(json.dumps(settings).encode())
-    for field in dataclasses.fields(poses):
-        array = np.asarray(getattr(poses, field.name))
-        digest.update(f"{field.name} {array.shape}".encode())
+    names = [field.name for field in dataclasses.fields(poses) if field.name != "mirror"]
+    arrays = {name: np.asarray(getattr(poses, name)) for name in names}
+    if image is not None:
+        arrays |= {"mirror_index": np.asarray(image.index), "mirror_sign": np.asarray(image.sign)}
+    for name, array in arrays.items():
+        digest.update(f"{name} {array.shape}".encode())
         if array.dtype.kind == "f":
             moments = [array.mean(axis=0, dtype=np.float64), array.std(axis=0, dtype=np.float64)]
             array = np.round(moments, _DECIMALS) + 0.0  # adding 0 turns -0 into 0
@@ -76,12 +80,10 @@ def fingerprint(poses: PoseSet, config: PriorConfig) -> str:
     return digest.hexdigest()[:16]
 
 
-def _settings(config: PriorConfig) -> dict[str, Any]:
-    """All settings but later ones at their defaults."""
-    default = PriorConfig()
-    values = dataclasses.asdict(config)
-    old = [name for name in _LATER if values[name] == getattr(default, name)]
-    return {name: value for name, value in values.items() if name not in old}
+def _settings(config: PriorConfig, mirrored: bool) -> dict[str, Any]:
+    """All settings but later ones that are as they were before."""
+    values = dataclasses.asdict(config) | {"mirror": mirrored}
+    return {name: x for name, x in values.items() if name not in _LATER or x != _LATER[name]}
 
 
 def save_prior(path: Path, prior: PosePrior, report: PriorReport) -> None:

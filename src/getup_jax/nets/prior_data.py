@@ -8,8 +8,10 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from getup_jax.mirror import SignedPermutation
 from getup_jax.motion.features import FeatureLinks, features
 from getup_jax.physics.character import CharacterSpec
+from getup_jax.physics.mirror_image import is_symmetric, joint_mirror
 
 # Rows in a block that is held out as one: 1 s of the usual 30 Hz. Single random frames would be
 # held out between near-copies of themselves, which says nothing about unseen poses.
@@ -28,6 +30,7 @@ class PoseSet:
     group: np.ndarray  # [N] rows of one group are held out together
     joint_lower: np.ndarray  # [J] rad
     joint_upper: np.ndarray  # [J] rad
+    mirror: SignedPermutation | None = None  # [J] of the angles; None: the body has no image
 
     def __post_init__(self) -> None:
         count, joints = self.angles.shape
@@ -72,6 +75,7 @@ def make_pose_set(
         group=np.tile(group, images),
         joint_lower=character.joint_lower.astype(np.float32),
         joint_upper=character.joint_upper.astype(np.float32),
+        mirror=joint_mirror(character) if is_symmetric(character) else None,
     )
 
 

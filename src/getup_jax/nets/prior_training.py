@@ -15,6 +15,7 @@ import numpy as np
 import optax
 from flax import struct
 
+from getup_jax import mirror
 from getup_jax.config import PriorConfig
 from getup_jax.nets import prior as pose_prior
 from getup_jax.nets.cvae import CVAE, init_variables, kl_to_standard_normal, loss_terms
@@ -96,8 +97,12 @@ def train_prior(
     rows = split(poses.group, config.holdout, config.seed)
     train, heldout = (_arrays(poses, part) for part in rows)
     num_joints = poses.angles.shape[1]
-    model = CVAE(num_joints, config.latent_size, config.hidden_sizes, config.conditional)
-    variables, epochs, updates = _fit(model, train, config, progress)
+    mirrored = config.mirror and poses.mirror is not None
+    model = CVAE(num_joints, config.latent_size, config.hidden_sizes, config.conditional, mirrored)
+    key_init, key_epochs = jax.random.split(jax.random.key(config.seed))
+    image = poses.mirror if mirrored else None
+    fresh = FitState(init_variables(model, key_init, *train, image), None, key_epochs)
+    variables, epochs, updates = _fit(model, fresh, train, config, progress)
     latent_mean, latent_std = _latent_scale(model, variables, *train)
     prior = PosePrior(
         variables=variables,
@@ -165,10 +170,15 @@ def pca_variance(angles: np.ndarray, components: int) -> float:
 def _latent_scale(
     model: CVAE, variables: Any, angles: jax.Array, condition: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
-    """Mean and standard deviation [Z] of the encoded poses, the latter floored."""
-    moments: Any = model.apply(variables, angles, condition, method="encode")
-    mean, _ = moments
-    return jnp.mean(mean, axis=0), jnp.maximum(jnp.std(mean, axis=0), MIN_LATENT_STD)
+    """Mean and standard deviation [Z] of the encoded poses, the latter floored.
+
+    Of a mirrored prior, those of the poses and their images.
+    """
+    encoded: Any = model.apply(variables, angles, condition, method="encode")
+    mean, variance = jnp.mean(encoded[0], axis=0), jnp.var(encoded[0], axis=0)
+    if model.mirrored:
+        mean, variance = mirror.latent(model.latent_size).moments(mean, variance)
+    return mean, jnp.maximum(jnp.sqrt(variance), MIN_LATENT_STD)
 
 
 @jax.jit
@@ -188,20 +198,19 @@ def _arrays(poses: PoseSet, rows: np.ndarray) -> tuple[jax.Array, jax.Array]:
 
 def _fit(
     model: CVAE,
+    state: FitState,
     data: tuple[jax.Array, jax.Array],
     config: PriorConfig,
     progress: Progress | None,
 ) -> tuple[dict[str, Any], int, int]:
-    """Trained variables, the number of epochs and of updates."""
-    key_init, key_epochs = jax.random.split(jax.random.key(config.seed))
+    """Trained variables, the number of epochs and of updates; `state` has no moments yet."""
     size = min(config.batch_size, len(data[0]))
     updates = len(data[0]) // size
     epochs = max(config.epochs, math.ceil(config.min_updates / updates))
     names = ("learning_rate", "last_rate", "weight_decay", "input_noise", "beta")
     values = {name: jnp.float32(getattr(config, name)) for name in names}
     recipe = Recipe(model, size, jnp.float32(epochs * updates), **values)
-    variables = init_variables(model, key_init, *data)
-    state = FitState(variables, recipe.optimiser.init(variables["params"]), key_epochs)
+    state = state.replace(moments=recipe.optimiser.init(state.variables["params"]))
     every = math.ceil(epochs / PROGRESS_CALLS)
     for epoch in range(1, epochs + 1):
         state, terms = _epoch(recipe, state, data, epoch)

@@ -29,6 +29,7 @@ from getup_jax.tasks.limp import LimpBodies
 from getup_jax.tasks.observation import Observer
 from getup_jax.tasks.region_pool import Site, build_region_pool
 from getup_jax.tasks.reset_pool import FlatStarts, build_pool
+from getup_jax.tasks.symmetry import find_symmetry
 
 _FLAT_S = 1.0  # a curve that lies flat for longer is mostly a matter of where it was cut
 
@@ -100,18 +101,20 @@ def assemble(
     log(f"engine: {engine.name}")
     latent_size = 0 if prior is None else prior.latent_size
     action_size = latent_size + character.num_joints
+    observer = Observer.of(
+        character,
+        len(config.task.lookahead_s),
+        action_size,
+        1.0 if config.terrain is None else config.terrain.relief_gain,
+    )
     task = GetUpTask(
         engine=engine,
         character=on_ground,
-        observer=Observer.of(
-            character,
-            len(config.task.lookahead_s),
-            action_size,
-            1.0 if config.terrain is None else config.terrain.relief_gain,
-        ),
+        observer=observer,
         config=config.task,
         latent_size=latent_size,
         terrain=config.terrain,
+        symmetry=find_symmetry(config, character, observer, prior),
     )
     place = Plane() if site is None else site.ground
     limp = LimpBodies(on_ground, place, config.task, config.seed, log).on_the_flat()

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from getup_jax.config import TaskConfig, TerrainConfig
+from getup_jax.mirror import Symmetry
 from getup_jax.motion import curves
 from getup_jax.nets.prior import PosePrior
 from getup_jax.physics.character import CharacterSpec
@@ -19,12 +20,7 @@ from getup_jax.tasks import assist, curriculum, early_ends, focus, practice, rew
 from getup_jax.tasks.actions import Units
 from getup_jax.tasks.drawn_curves import Curve, style_curve
 from getup_jax.tasks.draws import Draw, draw_starts, with_curves
-from getup_jax.tasks.episode import (
-    EpisodeState,
-    Record,
-    update_record,
-    verdict,
-)
+from getup_jax.tasks.episode import EpisodeState, Record, update_record, verdict
 from getup_jax.tasks.observation import Observer, Posture
 from getup_jax.tasks.reset_pool import Pool
 from getup_jax.types import Engine, StepOutput, take
@@ -56,6 +52,7 @@ class GetUpTask:
     config: TaskConfig
     latent_size: int  # 0 without a pose prior
     terrain: TerrainConfig | None = None  # None: a flat plane
+    symmetry: Symmetry | None = None  # of observations and actions; None: there is none
 
     @property
     def observation_size(self) -> int:
