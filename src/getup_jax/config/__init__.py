@@ -58,6 +58,11 @@ class Config:
         ok = scale == default or self.network.initial_std is not None
         expected = f"{default} where network.initial_std is null; ppo.action_std sets the noise"
         require(ok, "ppo.std_scale", expected, scale)
+        for name, off in (("track_weight", 0.0), ("sharpness", 1.0)):
+            value = getattr(self.task, name)
+            ok = self.composite is None or value == off
+            expected = f"{off:g} where `composite` says what is rewarded"
+            require(ok, f"task.{name}", expected, value)
         if self.composite is None or not self.composite.groups:
             return
         flat = "null with composite motion or discriminators, which are on a plane"

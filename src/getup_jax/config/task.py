@@ -39,6 +39,13 @@ class TaskConfig:
     assist_s: float = math.inf  # it lets go so long after the start, in any case
     assist_rates: tuple[float, float] = (0.02, 0.01)  # less of it for a success, more for a failure
     assist_share: float = 0.5  # share of the lying and clip starts with the hand; needs focus
+    # exponent on the height and orientation terms of the reward; 1: as in the paper. Early ends,
+    # return rates and reward_task are always those of 1
+    sharpness: float = 1.0
+    # weight of a second objective with a critic of its own, beside 1 of the task's: tracking alone,
+    # with a sharpness of its own; 0: off
+    track_weight: float = 0.0
+    track_sharpness: float = 3.0
     curve_match_rad: float = 0.52  # largest gap between a curve's and a pose's torso angles
     # 0: starts are drawn evenly; towards 1: at the frontier of what is learned, and on irregular
     # ground in regions where more fails
@@ -67,6 +74,9 @@ class TaskConfig:
         ok = 0 <= self.assist_share < 1
         require(ok, "task.assist_share", "at least 0 and less than 1", self.assist_share)
         require(self.head_grace_s >= 0, "task.head_grace_s", "at least 0", self.head_grace_s)
+        for name in ("sharpness", "track_sharpness"):
+            require(getattr(self, name) > 0, f"task.{name}", "more than 0", getattr(self, name))
+        require(self.track_weight >= 0, "task.track_weight", "at least 0", self.track_weight)
         ok = 0 <= self.drawn_share <= 1
         require(ok, "task.drawn_share", "between 0 and 1", self.drawn_share)
         require(self.curve_noise >= 0, "task.curve_noise", "at least 0", self.curve_noise)

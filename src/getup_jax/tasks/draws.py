@@ -40,6 +40,8 @@ def whole_episodes(config: TaskConfig) -> TaskConfig:
         assist=0.0,
         head_grace_s=0.0,
         drawn_share=0.0,
+        sharpness=1.0,
+        track_weight=0.0,
     )
 
 
