@@ -1,6 +1,6 @@
 """Draw critic_lag.csv: mean total reward and explained variance after training on from a policy.
 
-    python docs/lab/plot_critic_lag.py
+python docs/lab/plot_critic_lag.py
 """
 
 from __future__ import annotations

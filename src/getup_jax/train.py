@@ -42,14 +42,16 @@ def build_job(config: Config, log: Log) -> Job:
     if config.composite_motion:
         return build_composite_job(config, log)[1]
     task, objectives = build_task(config, log), None
+    weights = tuple(task.environment.objective_weights.values())
     if config.composite is not None:
         task = styled = with_objectives(config, task, log)
-        objectives = make_objectives(styled.environment, config.composite)
+        objectives, weights = make_objectives(styled.environment, config.composite), None
     learner = make_learner(
         task.environment,
         config.network,
         config.ppo,
         total_steps=config.train.total_steps,
+        weights=weights,
         objectives=objectives,
     )
     carry_over = _carry_over(learner, task.world, config)

@@ -100,6 +100,28 @@ def test_a_curve_that_overshoots_its_end_keeps_alpha_at_1_at_most():
     assert float(fast.min()) >= 0.0
 
 
+# Narrower kernels.
+
+
+def test_tracking_10_cm_and_2_tenths_off_in_both_angles():
+    # exp(-3 (1.7 * 0.1 + 1.5 (0.2 + 0.2)))
+    found = rewards.terms(
+        jnp.array([1.3, 1.2, 1.8]), jnp.array([1.4, 1.0, 2.0]), jnp.array(9.0),
+        jnp.zeros(57), jnp.zeros(19),
+    )  # fmt: skip
+    assert float(rewards.tracking(found, 3.0)) == pytest.approx(math.exp(-3 * 0.77), rel=1e-5)
+    np.testing.assert_allclose(rewards.tracking(found, 1.0), found["task"], rtol=1e-5)
+
+
+def test_sharpness_is_an_exponent_on_the_tracking_and_not_on_the_rest():
+    found = {"height": 0.5, "orientation": 0.8, "velocity": 0.9, "posture": 0.7}
+    found = {name: jnp.array(value) for name, value in found.items()}
+    found["task"] = rewards.task(found)
+    twice = 0.5**2 * 0.8**2 * 0.9 * 0.7
+    assert float(rewards.sharpened(found, 2.0)) == pytest.approx(twice, rel=1e-6)
+    assert float(rewards.sharpened(found, 1.0)) == float(found["task"])
+
+
 # Slow references in NumPy.
 
 
@@ -107,14 +129,8 @@ def test_all_terms_against_numpy():
     value, target = uniform(0, 2, N, 3), uniform(0, 2, N, 3)
     final, omega, joint = uniform(1, 2, N), uniform(-9, 9, N, 57), uniform(0, 1, N, 19)
     offset = uniform(-0.4, 0.4, N, 49)
-    alpha = rewards.phase(target[:, 0], final)
-    got = {
-        "height": rewards.height(value[:, 0], target[:, 0]),
-        "orientation": rewards.orientation(value[:, 1:], target[:, 1:]),
-        "velocity": rewards.velocity(omega, alpha),
-        "posture": rewards.posture(joint, alpha),
-    }
-    got |= {"task": rewards.task(got), "natural": rewards.natural(offset, 10.0)}
+    got = rewards.terms(value, target, final, omega, joint)
+    got |= {"natural": rewards.natural(offset, 10.0)}
     inputs = [np.asarray(x, np.float64) for x in (value, target, final, omega, joint, offset)]
     expected = [slow_terms(*row) for row in zip(*inputs, strict=True)]
     for name, term in got.items():

@@ -63,6 +63,11 @@ class Config:
         unlike = self.network.mirror and self.prior is not None and not self.prior.mirror
         expected = "false where prior.mirror is false, as its latents have no mirror images"
         require(self.composite_motion or not unlike, "network.mirror", expected, True)
+        for name, off in (("track_weight", 0.0), ("sharpness", 1.0)):
+            value = getattr(self.task, name)
+            ok = self.composite is None or value == off
+            expected = f"{off:g} where `composite` says what is rewarded"
+            require(ok, f"task.{name}", expected, value)
         if self.composite is None or not self.composite.groups:
             return
         flat = "null with composite motion or discriminators, which are on a plane"

@@ -51,6 +51,13 @@ class TaskConfig:
     assist_rates: tuple[float, float] = number((0.02, 0.01), above=0, most=1, length=2)
     # share of the lying and clip starts with the hand; needs focus
     assist_share: float = number(0.5, least=0, below=1)
+    # exponent on the height and orientation terms of the reward; 1: as in the paper. Early ends,
+    # return rates and reward_task are always those of 1
+    sharpness: float = number(1.0, above=0, most=100)
+    # weight of a second objective with a critic of its own, beside 1 of the task's: tracking alone,
+    # with a sharpness of its own; 0: off
+    track_weight: float = number(0.0, least=0, most=1000)
+    track_sharpness: float = number(3.0, above=0, most=100)
     # largest gap between a curve's and a pose's torso angles
     curve_match_rad: float = number(0.52, least=0, most=math.pi)
     # 0: starts are drawn evenly; towards 1: at the frontier of what is learned, and on irregular

@@ -43,6 +43,8 @@ def whole_episodes(config: TaskConfig) -> TaskConfig:
         drop_as="limp",
         fallen_share=0.0,
         drawn_share=0.0,
+        sharpness=1.0,
+        track_weight=0.0,
     )
 
 

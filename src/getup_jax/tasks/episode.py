@@ -87,6 +87,26 @@ def with_shared(state: EpisodeState, nested: Mapping[str, Any], where: str) -> E
     return state.replace(**from_nested(mine, {name: nested.get(name) for name in SHARED}, where))
 
 
+def recorded(
+    state: EpisodeState,
+    value: jax.Array,
+    target: jax.Array,
+    task_reward: jax.Array,
+    stand_time_s: float,
+) -> EpisodeState:
+    """The state with a step's features [B, 3], their targets [B, 3] and reward [B] recorded."""
+    record = update_record(
+        state.record,
+        value,
+        target,
+        state.points[:, -1, 0],
+        state.duration + stand_time_s - state.time,
+        state.time > state.duration,
+        task_reward,
+    )
+    return state.replace(record=record)
+
+
 def update_record(
     record: Record,
     value: jax.Array,

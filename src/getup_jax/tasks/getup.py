@@ -20,7 +20,7 @@ from getup_jax.tasks import assist, curriculum, early_ends, focus, practice, rew
 from getup_jax.tasks.actions import Units
 from getup_jax.tasks.drawn_curves import Curve, style_curve
 from getup_jax.tasks.draws import Draw, draw_starts, with_curves
-from getup_jax.tasks.episode import EpisodeState, Record, update_record, verdict
+from getup_jax.tasks.episode import EpisodeState, Record, recorded, verdict
 from getup_jax.tasks.observation import Observer, Posture
 from getup_jax.tasks.reset_pool import Pool
 from getup_jax.types import Engine, StepOutput, take
@@ -61,8 +61,14 @@ class GetUpTask:
 
     @property
     def num_objectives(self) -> int:
-        """K: all reward terms are multiplied into one."""
-        return 1
+        """K: one for each of `objective_weights`."""
+        return len(self.objective_weights)
+
+    @property
+    def objective_weights(self) -> dict[str, float]:
+        """Objectives and their weights: all terms multiplied, and tracking alone where it is on."""
+        track = self.config.track_weight
+        return {"total": 1.0} | ({"track": track} if track > 0 else {})
 
     @property
     def action_size(self) -> int:
@@ -197,14 +203,16 @@ class GetUpTask:
         head = gap < self.config.head_clearance_m
         state, causes = early_ends.counted(self.config, control_dt, state, terms["task"], head)
         causes["not_finite"] = ~finite
-        terms["total"] = early_ends.paid(self.config, control_dt, state, terms["total"])
+        for name in self.objective_weights:
+            terms[name] = early_ends.paid(self.config, control_dt, state, terms[name])
         terminated = causes["low_reward"] | causes["head"] | causes["not_finite"]
         half_step = 0.5 * control_dt
         end = state.duration + self.config.stand_time_s - half_step
         if state.until is not None:
             end = jnp.minimum(end, state.until - half_step)
         truncated = ~terminated & (state.time > end)
-        state = self._record(state, posture, target, terms["task"])
+        stand_s, value = self.config.stand_time_s, posture.features
+        state = recorded(state, value, target, terms["task"], stand_s)
         observation = jnp.where(finite[:, None], self._observe(state, posture), 0.0)
         state = state.replace(observation=observation)
         metrics = {f"reward_{name}": value for name, value in terms.items()}
@@ -212,7 +220,7 @@ class GetUpTask:
         output = StepOutput(
             observation=observation,
             final_observation=observation,
-            reward=terms["total"][:, None],
+            reward=jnp.stack([terms[name] for name in self.objective_weights], axis=-1),
             terminated=terminated,
             truncated=truncated,
             metrics=metrics,
@@ -272,42 +280,20 @@ class GetUpTask:
     def _reward_terms(
         self, world: World, state: EpisodeState, posture: Posture, target: jax.Array
     ) -> dict[str, jax.Array]:
-        value = posture.features
-        alpha = rewards.phase(target[:, 0], state.points[:, -1, 0])
+        config = self.config
+        omega = posture.link_angular_velocity.reshape(len(target), -1)
         joint_error = angle(multiply(conjugate(world.neutral_rotation), posture.joint_rotation))
-        omega = posture.link_angular_velocity.reshape(len(alpha), -1)
-        offset = self.config.offset_scale * state.action[:, self.latent_size :]
-        terms = {
-            "height": rewards.height(value[:, 0], target[:, 0]),
-            "orientation": rewards.orientation(value[:, 1:], target[:, 1:]),
-            "velocity": rewards.velocity(omega, alpha),
-            "posture": rewards.posture(joint_error, alpha),
-        }
-        terms["task"] = rewards.task(terms)
+        end = state.points[:, -1, 0]
+        terms = rewards.terms(posture.features, target, end, omega, joint_error)
+        terms["total"] = rewards.sharpened(terms, config.sharpness)
+        if config.track_weight > 0:
+            terms["track"] = rewards.tracking(terms, config.track_sharpness)
         if world.prior is None:  # nothing that offsets could be unnatural to [P 6.4]
-            return terms | {"total": terms["task"]}
-        terms["natural"] = rewards.natural(offset, self.config.offset_limit_rad)
-        terms["total"] = terms["task"] * terms["natural"]
+            return terms
+        offset = config.offset_scale * state.action[:, self.latent_size :]
+        terms["natural"] = rewards.natural(offset, config.offset_limit_rad)
+        terms["total"] = terms["total"] * terms["natural"]
         return terms
-
-    def _record(
-        self,
-        state: EpisodeState,
-        posture: Posture,
-        target: jax.Array,
-        task_reward: jax.Array,
-    ) -> EpisodeState:
-        time_left = state.duration + self.config.stand_time_s - state.time
-        record = update_record(
-            state.record,
-            posture.features,
-            target,
-            state.points[:, -1, 0],
-            time_left,
-            state.time > state.duration,
-            task_reward,
-        )
-        return state.replace(record=record)
 
     def _full_steps(self, state: EpisodeState) -> jax.Array:
         """Steps [B] that an episode with this start has, if it does not end early."""

@@ -1,4 +1,6 @@
-"""The get-up reward, equations 2 to 9 of [P 5.1]; every term is a pure function.
+"""The get-up reward, equations 2 to 9 of [P 5.1], and narrower kernels of the tracking in it.
+
+Every term is a pure function.
 
 Shapes are [...]: any leading axes. Heights are in m, angles in rad, rates in rad/s.
 """
@@ -49,3 +51,35 @@ def natural(offset: jax.Array, limit: float) -> jax.Array:
 def task(terms: dict[str, jax.Array]) -> jax.Array:
     """Equation 4: the product of the task's terms."""
     return terms["height"] * terms["orientation"] * terms["velocity"] * terms["posture"]
+
+
+def tracking(terms: dict[str, jax.Array], sharpness: float) -> jax.Array:
+    """(r_h r_theta)^k = exp(-k (1.7 |dh| + 1.5 |dtheta_x| + 1.5 |dtheta_z|)); k = sharpness."""
+    return (terms["height"] * terms["orientation"]) ** sharpness
+
+
+def sharpened(terms: dict[str, jax.Array], sharpness: float) -> jax.Array:
+    """Equation 4 with r_h and r_theta to the power of `sharpness`; 1: equation 4 itself."""
+    return terms["task"] * tracking(terms, sharpness - 1.0)
+
+
+def terms(
+    value: jax.Array,
+    target: jax.Array,
+    final_height: jax.Array,
+    angular_velocity: jax.Array,
+    joint_angle: jax.Array,
+) -> dict[str, jax.Array]:
+    """The terms of equation 4 by name, and their product as `task`.
+
+    Features value [..., 3] and their targets [..., 3]: height, side and front angle; height of
+    the curve's end [...]; omega [..., 57] and angles [..., 19] to the neutral pose's joints.
+    """
+    alpha = phase(target[..., 0], final_height)
+    found = {
+        "height": height(value[..., 0], target[..., 0]),
+        "orientation": orientation(value[..., 1:], target[..., 1:]),
+        "velocity": velocity(angular_velocity, alpha),
+        "posture": posture(joint_angle, alpha),
+    }
+    return found | {"task": task(found)}

@@ -1,0 +1,105 @@
+"""A sharper tracking kernel, and tracking as an objective of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from tiny_task import CONFIG, tiny_task
+
+from getup_jax import train
+from getup_jax.config import CompositeConfig, Config, ConfigError, NetworkConfig, PPOConfig
+from getup_jax.tasks.build import BuiltTask
+from getup_jax.tasks.draws import whole_episodes
+from getup_jax.tasks.episode import LYING
+
+PPO = PPOConfig(num_envs=8, num_steps=3, epochs=1, minibatch_size=24, popart=True)
+SHARP = dataclasses.replace(CONFIG.task, sharpness=1.5, track_weight=0.5, track_sharpness=3.0)
+
+
+def with_task(task) -> Config:
+    network = NetworkConfig(hidden_sizes=(8,))
+    return dataclasses.replace(CONFIG, task=task, ppo=PPO, network=network)
+
+
+@pytest.fixture(scope="module")
+def sharp(character) -> BuiltTask:
+    return tiny_task(character, with_task(SHARP))
+
+
+def one_step(built: BuiltTask):
+    """A state of four lying episodes with some offsets after a step, and what the step gave."""
+    env, rows = built.environment, jnp.arange(4)
+    state = env.start(built.world, rows % 2, jnp.full(4, LYING), rows)
+    state = state.replace(action=state.action.at[:, -9:].set(0.5), time=state.time + 0.3)
+    return jax.jit(env.advance)(built.world, state, state.action)
+
+
+def test_what_is_paid_is_sharper_and_what_is_reported_is_the_papers(built, sharp):
+    (plain_state, plain), (state, output) = one_step(built), one_step(sharp)
+    terms = {name: np.asarray(x) for name, x in output.metrics.items()}
+    for name in ("height", "orientation", "velocity", "posture", "task", "natural"):
+        np.testing.assert_array_equal(terms[f"reward_{name}"], plain.metrics[f"reward_{name}"])
+    tracked = terms["reward_height"] * terms["reward_orientation"]
+    assert (tracked < 0.95).all()
+    total = terms["reward_task"] * terms["reward_natural"] * tracked**0.5
+    np.testing.assert_allclose(terms["reward_total"], total, rtol=1e-5)
+    np.testing.assert_allclose(terms["reward_track"], tracked**3, rtol=1e-5)
+    np.testing.assert_array_equal(output.reward[:, 0], terms["reward_total"])
+    np.testing.assert_array_equal(output.reward[:, 1], terms["reward_track"])
+    jax.tree.map(np.testing.assert_array_equal, state.record, plain_state.record)
+    assert plain.reward.shape == (4, 1)
+    assert "reward_track" not in plain.metrics
+
+
+def test_a_grace_time_pays_no_objective(character):
+    # the head counts as on the floor wherever it is
+    task = dataclasses.replace(SHARP, head_grace_s=9.0, head_clearance_m=9.0)
+    lenient = tiny_task(character, with_task(task))
+    env, rows = lenient.environment, jnp.arange(4)
+    state = env.start(lenient.world, rows % 2, jnp.full(4, LYING), rows)
+    held = state.replace(head_steps=jnp.array([0, 0, 20, 20]))
+    _, output = jax.jit(env.advance)(lenient.world, held, state.action)
+    assert (np.asarray(output.reward[:2]) > 0.1).all()
+    np.testing.assert_array_equal(output.reward[2:], 0.0)
+    assert (np.asarray(output.metrics["reward_task"]) > 0.1).all()
+
+
+def test_the_learner_has_a_critic_each_with_the_weights_that_are_set(sharp, monkeypatch):
+    monkeypatch.setattr(train, "build_task", lambda config, log: sharp)
+    job = train.build_job(with_task(SHARP), lambda text: None)
+    np.testing.assert_allclose(job.learner.weights, (2 / 3, 1 / 3))
+    state = job.learner.init(job.world, jax.random.PRNGKey(0))
+    value = job.learner.value(state.learner, state.environment.observation)
+    assert value.shape == (8, 2)
+    _, metrics = jax.jit(job.learner.iteration)(job.world, state)
+    assert 0.0 < float(metrics["rollout/reward_track"]) < 1.0
+
+
+def test_evaluation_has_the_papers_reward_alone():
+    task = whole_episodes(SHARP)
+    assert (task.sharpness, task.track_weight) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"sharpness": 0.0}, r"task\.sharpness: expected more than 0, got 0\.0"),
+        ({"track_sharpness": -1.0}, r"task\.track_sharpness: expected more than 0"),
+        ({"track_weight": -0.1}, r"task\.track_weight: expected at least 0, got -0\.1"),
+    ],
+)
+def test_mistakes_of_the_settings(settings, message):
+    with pytest.raises(ConfigError, match=message):
+        dataclasses.replace(CONFIG.task, **settings)
+
+
+@pytest.mark.parametrize("name", ["sharpness", "track_weight"])
+def test_a_composite_says_itself_what_is_rewarded(name):
+    task = dataclasses.replace(CONFIG.task, **{name: 2.0})
+    composite = CompositeConfig(task="getup", terms=("total",))
+    with pytest.raises(ConfigError, match=rf"task\.{name}: expected . where `composite`"):
+        dataclasses.replace(CONFIG, task=task, composite=composite)
