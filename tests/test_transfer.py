@@ -9,9 +9,18 @@ import numpy as np
 import pytest
 from tiny_task import untrained_prior
 
-from eval_samples import SMALL, make_policy, make_task
+from eval_samples import SMALL, make_policy, make_task, save_policy
 from getup_jax import lessons, transfer
+from getup_jax.algo.actor_critic import observe
+from getup_jax.algo.learner import Learner
+from getup_jax.algo.state import PolicyState
+from getup_jax.checkpoint import CHECKPOINTS, LoadedPolicy, load_policy, save_learner
+from getup_jax.config import Config
+from getup_jax.storage import CheckpointError
 from getup_jax.tasks.actions import Units
+from getup_jax.tasks.build import BuiltTask
+from getup_jax.tasks.observation import Observer
+from getup_jax.tasks.symmetry import find_symmetry
 from getup_jax.transfer import Origin, carry_over
 
 KEY = jax.random.PRNGKey(0)
@@ -112,3 +121,109 @@ def test_the_difference_is_the_root_mean_square_in_degrees(task, old):
     target = old.target(learner.act(policy, observation), condition) + math.radians(3.0)
     lesson = lessons.Lesson(observation, action, target, condition)
     assert lessons.compare(learner, policy, old, lesson)[0] == pytest.approx(3.0, rel=1e-3)
+
+
+# --- mirror images
+
+
+@pytest.fixture(scope="module")
+def mirrored(task):
+    """The task with a prior that has mirror images, and so with a symmetry."""
+    character = task.environment.character
+    prior = untrained_prior(character, seed=1, mirrored=True)
+    symmetry = find_symmetry(CONFIG, character, task.environment.observer, prior)
+    env = dataclasses.replace(task.environment, symmetry=symmetry)
+    return BuiltTask(env, task.world.replace(prior=prior), prior, task.getups)
+
+
+def plain(config: Config = CONFIG) -> Config:
+    return dataclasses.replace(
+        config,
+        network=dataclasses.replace(config.network, mirror=False),
+        prior=None if config.prior is None else dataclasses.replace(config.prior, mirror=False),
+    )
+
+
+def observed(policy: PolicyState, learner: Learner, seed: int = 0) -> PolicyState:
+    """The policy after it has seen random observations."""
+    size = learner.env.observation_size
+    seen = jax.random.normal(jax.random.PRNGKey(seed), (64, size)) + 1.0
+    return observe(policy, seen, learner.model.symmetry)
+
+
+@pytest.mark.parametrize("was_mirrored", [False, True])
+def test_a_policy_is_taught_to_networks_with_and_without_mirror_images(
+    mirrored, was_mirrored, monkeypatch
+):
+    monkeypatch.setattr(transfer, "_ROLLOUTS", 8)
+    monkeypatch.setattr(lessons, "_EPOCHS", 60)
+    monkeypatch.setattr(lessons, "_MINIBATCH", 64)
+    configs = (CONFIG, plain()) if was_mirrored else (plain(), CONFIG)
+    (teacher, policy), (learner, _) = (make_policy(mirrored, config) for config in configs)
+    policy = observed(policy, teacher)
+    kernel = 0.1 * jax.random.normal(KEY, policy.actor["params"]["output"]["kernel"].shape)
+    output = {**policy.actor["params"]["output"], "kernel": kernel}
+    actor = {**policy.actor, "params": {**policy.actor["params"], "output": output}}
+    policy = dataclasses.replace(policy, actor=actor)
+    start = Origin(CONFIG.task, mirrored.world.prior, teacher.model.symmetry)
+    log: list[str] = []
+    taught = carry_over(learner, mirrored.world, policy, start, KEY, log.append)
+    after, before, _ = (float(word) for word in log[-1].split() if word[0].isdigit())
+    assert after < 0.5 * before
+    if not was_mirrored:
+        image = mirrored.environment.symmetry.observation
+        np.testing.assert_allclose(image(taught.statistics.mean), taught.statistics.mean, atol=1e-5)
+
+
+def loaded_from(folder, task: BuiltTask, config: Config) -> LoadedPolicy:
+    return load_policy(save_policy(folder, task, config))
+
+
+def test_what_a_checkpoint_was_trained_with_is_read_off_it(tmp_path, mirrored, task):
+    learner, _ = make_policy(mirrored, CONFIG)
+    both = loaded_from(tmp_path / "both", mirrored, CONFIG)
+    assert transfer.origin(learner, mirrored.world, both, whole=True).symmetry is not None
+    free = dataclasses.replace(CONFIG, network=plain().network)
+    for config, built in ((free, mirrored), (plain(), task), (CONFIG, task)):
+        loaded = loaded_from(tmp_path / f"{config.network.mirror} {built is task}", built, config)
+        start = transfer.origin(learner, mirrored.world, loaded, whole=False)
+        assert start.symmetry is None
+        assert start.prior.mirrored == built.prior.mirrored
+
+
+def test_a_critic_is_not_taught(tmp_path, mirrored, task):
+    learner, _ = make_policy(mirrored, CONFIG)
+    old = loaded_from(tmp_path, task, plain())
+    expected = (
+        r"network\.mirror is false there; expected the same here with train\.init_learner; "
+        r"set network\.mirror=false prior\.mirror=false"
+    )
+    with pytest.raises(CheckpointError, match=expected):
+        transfer.origin(learner, mirrored.world, old, whole=True)
+    other, _ = make_policy(task, plain())
+    new = loaded_from(tmp_path / "new", mirrored, CONFIG)
+    with pytest.raises(CheckpointError, match=r"set network\.mirror=true prior\.mirror=true"):
+        transfer.origin(other, task.world, new, whole=True)
+
+
+def test_without_a_prior_nothing_is_taught(tmp_path, mirrored):
+    env = mirrored.environment
+    observer = Observer.of(env.character, 4, 49)
+    symmetry = find_symmetry(CONFIG, env.character, observer, None)
+    env = dataclasses.replace(env, observer=observer, symmetry=symmetry, latent_size=0)
+    bare = BuiltTask(env, mirrored.world.replace(prior=None), None, mirrored.getups)
+    config = dataclasses.replace(CONFIG, prior=None)
+    learner, policy = make_policy(bare, config)
+    for saved in (config, plain(config)):
+        folder = tmp_path / str(saved.network.mirror)
+        item = {"policy": policy, "prior": None}
+        save_learner(folder / CHECKPOINTS, 1, policy, saved, item, {})
+        if saved.network.mirror:
+            assert transfer.origin(learner, bare.world, load_policy(folder), False).prior is None
+            continue
+        with pytest.raises(CheckpointError, match=r"pose prior; set network\.mirror=false$"):
+            transfer.origin(learner, bare.world, load_policy(folder), whole=False)
+    with pytest.raises(CheckpointError, match="was trained without a pose prior"):
+        transfer.origin(
+            make_policy(mirrored, CONFIG)[0], mirrored.world, load_policy(folder), False
+        )

@@ -223,12 +223,15 @@ def test_settings_that_came_later_name_another_prior_once_they_are_used(name):
     assert prior_cache.fingerprint(poses, used) != prior_cache.fingerprint(poses, BRIEF)
 
 
-def test_the_shipped_prior_belongs_to_the_shipped_motions_and_the_default_settings():
+def test_the_shipped_priors_belong_to_the_shipped_motions_and_the_default_settings():
     poses = load_motions(MotionConfig(), character()).poses
-    name = prior_cache.fingerprint(make_pose_set(poses, character(), mirrored=True), PriorConfig())
-    prior, report = prior_cache.load_prior(asset_path("priors", f"prior-{name}.npz"))
-    assert prior.num_joints == character().num_joints
-    assert report.heldout_rmse_deg < 5.0
+    both = make_pose_set(poses, character(), mirrored=True)
+    for mirrored in (True, False):
+        name = prior_cache.fingerprint(both, PriorConfig(mirror=mirrored))
+        prior, report = prior_cache.load_prior(asset_path("priors", f"prior-{name}.npz"))
+        assert prior.num_joints == character().num_joints
+        assert prior.mirrored == mirrored
+        assert report.heldout_rmse_deg < 2.6
 
 
 # --- what the prior does to bodies
