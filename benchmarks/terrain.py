@@ -30,7 +30,7 @@ from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.settle import lift_to_ground, settle
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap, make_terrain
 from getup_jax.settings import load_config
-from getup_jax.tasks.falls import fall
+from getup_jax.tasks.falls import DROPS, evenly, fall
 from getup_jax.tasks.observation import GRID_POINTS
 
 STEPS = 10  # control steps of one round
@@ -177,7 +177,8 @@ def time_falls(
     character: CharacterSpec, ground: TerrainMap, count: int, config: TerrainConfig
 ) -> dict[str, float]:
     begin = time.perf_counter()
-    fall(character, ground, count, config.seed, print)
+    rng = np.random.default_rng(config.seed)
+    fall(character, ground, evenly(count), DROPS["limp"], rng, print)
     return {"drops": count, "seconds": time.perf_counter() - begin}
 
 

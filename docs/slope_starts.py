@@ -63,7 +63,7 @@ def _config(config: Config, args: argparse.Namespace) -> Config:
     """That of the evaluation, with the rows that are asked for and the hand's time."""
     asked = argparse.Namespace(
         episodes=len(REGIONS) * args.rows * 100, curves=None, engine=None, stand_time=None,
-        start="lying", start_noise=0.0, seed=args.seed, terrain_seed=None,
+        start="lying", start_noise=0.0, seed=args.seed, terrain_seed=None, drops=None,
     )  # fmt: skip
     config = evaluation_config(config, asked)
     return dataclasses.replace(config, task=dataclasses.replace(config.task, assist_s=args.until))

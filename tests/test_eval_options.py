@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from getup_jax.conditions import DROPPED
 from getup_jax.eval_options import eval_parser
 
 
@@ -22,6 +23,14 @@ def test_conditions():
 )
 def test_blend(arguments, blend):
     assert parse(*arguments).blend == blend
+
+
+def test_every_way_to_lie_is_an_option_of_drops():
+    assert parse().drops is None
+    for name in DROPPED:
+        assert parse("--drops", name).drops == name
+    with pytest.raises(SystemExit):
+        parse("--drops", "gently")
 
 
 def test_outputs_may_be_in_any_case_and_folder(tmp_path):

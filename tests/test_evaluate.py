@@ -53,6 +53,11 @@ def test_eval_writes_scores_policy_and_conditions(results):
     conditions = found["conditions"]
     assert (conditions["start_noise_rad"], conditions["duration_scale"]) == (0.05, [0.8, 1.2])
     assert (conditions["stand_time_s"], conditions["engine"]) == (1.0, "native")
+    assert (conditions["drops"], conditions["drop"]) == (None, None)
+    assert found["rules"] == {
+        "success": {"last_s": 1.0, "lowest_in_last_s": 0.85, "mean_standing": 0.9},
+        "early_end": {"task_reward_below": 0.1, "head_gap_below_m": 0.02, "longer_than_s": 0.3},
+    }
     assert 0.0 <= found["saturation"] <= 1.0
     assert found["offset_rad"] > 0
     assert found["foot_slip_m_s"] > 0
@@ -68,6 +73,28 @@ def test_the_config_of_an_evaluation_takes_its_starts_from_the_arguments():
     task = evaluate.evaluation_config(config, args).task
     assert (task.stand_start, task.start_noise_rad) == (1.0, 0.1)
     assert Conditions.of(args).kind == 1
+
+
+def test_bodies_are_dropped_as_asked_and_not_those_of_the_training():
+    settings = ["task.limp_share=0.4", "task.fallen_share=0.2", "task.drop_as=any"]
+    config = load_config(None, settings)
+
+    def task(*options: str, config=config):
+        return evaluate.evaluation_config(config, cli.eval_parser().parse_args(options)).task
+
+    plain = task()
+    assert (plain.limp_share, plain.fallen_share, plain.drop_as) == (0.0, 0.0, "limp")
+    paper = task("--drops", "paper")
+    assert (paper.limp_share, paper.fallen_share, paper.drop_as) == (1.0, 0.0, "paper")
+    fallen = task("--drops", "fallen")
+    assert (fallen.limp_share, fallen.fallen_share) == (1.0, 1.0)
+    alike = load_config(None, [f"task.limp_drops={paper.limp_drops}"])
+    assert task("--drops", "paper", config=alike).limp_drops != paper.limp_drops
+
+
+def test_how_bodies_lie_means_nothing_to_standing_starts(run_folder, capsys):
+    assert cli.eval_main(["--ckpt", str(run_folder), "--drops", "paper", "--start=standing"]) == 2
+    assert capsys.readouterr().err.startswith("ConfigError: --drops: says how bodies lie")
 
 
 def test_a_push_without_time_to_stand_is_refused_before_anything_is_built(run_folder, capsys):
@@ -116,11 +143,14 @@ def test_an_export_is_a_small_policy_with_a_card(run_folder, results, tmp_path, 
 def test_a_card_has_a_row_a_region(run_folder, results, tmp_path):
     found = json.loads(results.read_text())
     found["conditions"]["terrain_seed"] = 7
+    found["conditions"]["drops"] = "paper"
     found["per_region"] = {"hard": found | {"success": 0.25}}
+    found["per_ground"] = {"slope 20-30°": found | {"success": 0.125}}
     file = tmp_path / "regions.json"
     file.write_text(json.dumps(found))
     card = (export.export(run_folder, tmp_path / "tiny", [file]) / CARD).read_text()
-    assert "U(0.8, 1.2), ground of seed 7" in card
+    assert "U(0.8, 1.2), ground of seed 7, bodies as of --drops paper" in card
+    assert "| slope 20-30° | 12.5% (0.0% - 56.1%) |" in card
     assert "| region hard | 25.0% (0.0% - 56.1%) |" in card
 
 

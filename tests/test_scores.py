@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from getup_jax.grounds import Places
 from getup_jax.motion.clips import GetUp
 from getup_jax.score_table import table
 from getup_jax.scores import episode_values, score, stand_time, to_json, wilson
@@ -15,12 +16,13 @@ from getup_jax.tasks.episode import STANDING
 DT = 0.5
 STAND_S = 1.0
 KEYS = {
-    "success", "success_low", "success_high", "return_rate", "height_error_m", "angle_error_rad",
+    "success", "success_low", "success_high", "return_rate", "return_rate_total",
+    "height_error_m", "angle_error_rad",
     "stand_time_s", "jitter", "torque_nm", "energy_j", "saturation", "offset_rad", "foot_slip_m_s",
     "penetration_m", "penetration_max_m", "success_pushed", "episodes", "per_orientation",
-    "per_curve", "per_region",
+    "per_curve", "per_region", "per_ground",
 }  # fmt: skip
-GROUPS = {"per_orientation", "per_curve", "per_region"}
+GROUPS = {"per_orientation", "per_curve", "per_region", "per_ground"}
 STEP_VALUES = ("torque", "power", "jerk", "saturation", "offset", "slip", "penetration")
 
 
@@ -213,17 +215,31 @@ def test_scores_by_the_way_of_lying():
     assert score(trace, style, lying, DT, STAND_S, STANDING).per_orientation is None
 
 
-def test_scores_by_region():
+def test_the_total_return_rate_counts_long_episodes_for_more():
+    # of full episodes of 4 and 2 steps, all of the first and half of the second
+    trace = make_trace(np.ones((4, 2)), np.array([[1, 1], [1, 0], [1, 0], [1, 0]]))
+    trace.duration[:, 1] = 0.0
+    scores = score(trace, np.array([0, 1]), styles("long", "short"), DT, STAND_S)
+    assert scores.return_rate == pytest.approx((4 / 4 + 1 / 2) / 2)
+    assert scores.return_rate_total == pytest.approx((4 + 1) / (4 + 2))
+    assert scores.per_curve["short"].return_rate_total == pytest.approx(1 / 2)
+
+
+def test_scores_by_region_and_kind_of_ground():
     trace = make_trace(np.ones((3, 4)), success=np.array([True, False, True, False]))
-    region = np.array([0, 0, 3, 1])
-    scores = score(trace, np.zeros(4, int), styles("a"), DT, STAND_S, region=region)
+    region = np.array(["flat", "flat", "hard", "easy"])
+    kind = np.array(["flat ground", "flat ground", "slope 20-30°", "rough"])
+    places = Places(region, kind)
+    scores = score(trace, np.zeros(4, int), styles("a"), DT, STAND_S, places=places)
+    grounds = {name: (x.episodes, x.success) for name, x in scores.per_ground.items()}
+    assert grounds == {"flat ground": (2, 0.5), "rough": (1, 0.0), "slope 20-30°": (1, 1.0)}
     found = {name: (x.episodes, x.success) for name, x in scores.per_region.items()}
     assert found == {"flat": (2, 0.5), "easy": (1, 0.0), "hard": (1, 1.0)}
     assert (scores.per_region["flat"].success_low, scores.per_region["flat"].success_high) == (
         wilson(1, 2)
     )
     assert set(to_json(scores)["per_region"]["hard"]) == KEYS - GROUPS
-    assert {"flat", "easy", "hard"} <= rows_of(table(scores)).keys()
+    assert {"flat", "easy", "hard", "rough", "slope 20-30°"} <= rows_of(table(scores)).keys()
 
 
 def test_json_has_every_score_and_no_nan():

@@ -18,9 +18,15 @@ from getup_jax.motion.library import load_motions
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.settings import load_config
 from getup_jax.tasks.episode import LYING, STANDING
+from getup_jax.tasks.falls import DROPS
 from getup_jax.tasks.region_pool import region_starts
 from getup_jax.tasks.reset_pool import Pool, angle_gap
 
+# --drops: what the task's config says about the bodies that episodes begin with
+DROPPED: dict[str, dict[str, Any]] = {
+    **{name: {"drop_as": name} for name in DROPS},
+    "fallen": {"fallen_share": 1.0},
+}
 PUSH_AFTER_S = 1.0  # a push comes at the first chance this long after the curve's end
 
 
@@ -36,6 +42,9 @@ class Conditions:
     seed: int = 0
     curves: tuple[str, ...] = ()  # curve files in place of the trained styles
     motions: str | None = None  # a config whose motions are there in place of the trained styles
+    drops: str | None = (
+        None  # how bodies came to lie, see DROPPED; None: as in training without limp_share
+    )
 
     @classmethod
     def of(cls, args: argparse.Namespace) -> Conditions:
@@ -49,6 +58,7 @@ class Conditions:
             seed=args.seed,
             curves=tuple(map(str, args.curves or ())),
             motions=None if args.motions is None else str(args.motions),
+            drops=args.drops,
         )
 
     @property
@@ -58,6 +68,8 @@ class Conditions:
 
     def check(self, config: Config) -> None:
         """Raise ConfigError for what cannot be evaluated under the config."""
+        if self.drops is not None and self.kind == STANDING:
+            raise ConfigError("--drops: says how bodies lie, but --start standing has none that do")
         stand_s = config.task.stand_time_s
         if self.push_ns is not None and stand_s <= PUSH_AFTER_S:
             raise ConfigError(

@@ -16,6 +16,7 @@ examples:
   getup-eval --start-noise 0.1 --duration-scale 0.8,1.2
                                                        other start poses, faster and slower
   getup-eval --blend --push 20                         curves never seen, and pushes
+  getup-eval --ckpt terrain --drops paper              bodies dropped as the papers do
   getup-eval --curves my_rise.yaml                     a style from getup-edit
   getup-eval --motions configs/flat_lafan1.yaml        recorded get-ups that it has never seen
 
@@ -88,6 +89,14 @@ def _add_conditions(group: argparse._ArgumentGroup) -> None:
         default=(1.0, 1.0),
         metavar="LOW,HIGH",
         help="each episode's curves last T x U(LOW, HIGH), such as 0.8,1.2",
+    )
+    add(
+        "--drops",
+        choices=("paper", "limp", "any", "fallen"),
+        help="how bodies came to lie, on flat ground too: paper: dropped prone or supine in the "
+        "neutral pose, with weak servos; limp: prone, supine or on a side, all hinges bent at "
+        "random, servos off; any: limp in every orientation; fallen: pushed over (default: the "
+        "motions' first poses on flat ground, limp elsewhere)",
     )
     styles = group.add_mutually_exclusive_group()
     styles.add_argument(

@@ -12,15 +12,25 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import numpy as np
 
 from getup_jax import checkpoint, eval_plot, video
 from getup_jax.algo.learner import Learner, make_learner
 from getup_jax.algo.state import PolicyState
 from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.composite.evaluate import evaluate_composite
-from getup_jax.conditions import Conditions, blended, drawn, make_plan, of_config
+from getup_jax.conditions import (
+    DROPPED,
+    Conditions,
+    Plan,
+    blended,
+    drawn,
+    make_plan,
+    of_config,
+)
 from getup_jax.config import Config, ConfigError, TaskConfig, TerrainConfig
 from getup_jax.episodes import Episodes, run_episodes
+from getup_jax.grounds import Places
 from getup_jax.motion.clips import GetUp
 from getup_jax.motion.curve_file import read_curve_file
 from getup_jax.nets import prior as pose_prior
@@ -32,9 +42,11 @@ from getup_jax.scores import Scores, score, to_json
 from getup_jax.storage import from_nested
 from getup_jax.tasks.build import BuiltTask, build_task
 from getup_jax.tasks.draws import whole_episodes
+from getup_jax.tasks.episode import LAST_S, STAND_LOWEST, STAND_MEAN
+from getup_jax.tasks.falls import DROPS
 
 _EPISODES = 100  # by default; on irregular ground in each region
-_DROPS = 1500  # rag-dolls on irregular ground
+_DROPS, _FLAT_DROPS = 1500, 500  # bodies that fall on irregular ground, and on flat ground
 
 Choice = Callable[[tuple[GetUp, ...], CharacterSpec], tuple[GetUp, ...]]
 
@@ -88,9 +100,19 @@ def evaluate(
         control_dt,
         config.task.stand_time_s,
         conditions.kind,
-        plan.region,
+        _places(config, task, plan),
     )
     return episodes, scores
+
+
+def _places(config: Config, task: BuiltTask, plan: Plan) -> Places | None:
+    """Where the episodes start on irregular ground; None on a flat plane."""
+    if config.terrain is None or plan.region is None:
+        return None
+    pool = task.world.pool
+    index = np.asarray(pool.table)[plan.kind, plan.region, plan.getup, plan.row]
+    xy = np.asarray(pool.physics.kinematics.qpos)[index, :2]
+    return Places.of(plan.region, xy, config.terrain)
 
 
 def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
@@ -111,9 +133,18 @@ def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
         terminate_reward=TaskConfig.terminate_reward,
         pool_size=episode_count(config, args),
         stand_time_s=stand_time_s,
+        **_dropped(task, args.drops),
     )
     terrain = _evaluation_terrain(config.terrain, args.terrain_seed)
     return dataclasses.replace(config, physics=physics, task=task, terrain=terrain, seed=args.seed)
+
+
+def _dropped(task: TaskConfig, drops: str | None) -> dict[str, Any]:
+    """Settings of the task for bodies that were dropped so; they are not those of the training."""
+    if drops is None:
+        return {}
+    count = _FLAT_DROPS - (task.limp_drops == _FLAT_DROPS)
+    return {"limp_share": 1.0, "limp_drops": count, **DROPPED[drops]}
 
 
 def episode_count(config: Config, args: argparse.Namespace) -> int:
@@ -137,7 +168,8 @@ def _evaluation_terrain(terrain: TerrainConfig | None, seed: int | None) -> Terr
 def description(
     config: Config, loaded: LoadedPolicy, conditions: Conditions, episodes: Episodes
 ) -> dict[str, Any]:
-    """What the JSON file says beside the scores: {"policy": ..., "conditions": ...}."""
+    """What the JSON file says beside the scores: the policy, the conditions and the rules."""
+    task = config.task
     return {
         "policy": {"path": str(loaded.path), "seed": loaded.config.seed, **loaded.metadata},
         "conditions": {
@@ -146,8 +178,25 @@ def description(
             "engine": episodes.task.environment.engine.name,
             "terrain_seed": None if config.terrain is None else config.terrain.seed,
             "pushed_episodes": int(episodes.trace.pushed.any(axis=0).sum()),
+            "drop": None if conditions.drops is None else _drop(task),
+        },
+        "rules": {
+            "success": {
+                "last_s": LAST_S,
+                "lowest_in_last_s": STAND_LOWEST,
+                "mean_standing": STAND_MEAN,
+            },
+            "early_end": {
+                "task_reward_below": task.terminate_reward,
+                "head_gap_below_m": task.head_clearance_m,
+                "longer_than_s": task.terminate_after_s,
+            },
         },
     }
+
+
+def _drop(task: TaskConfig) -> dict[str, Any]:
+    return {**dataclasses.asdict(DROPS[task.drop_as]), "fallen_share": task.fallen_share}
 
 
 class _Rate:

@@ -104,9 +104,10 @@ def _training(loaded: LoadedPolicy, provenance: Provenance) -> dict[str, str]:
 
 
 def _numbers(result: Mapping[str, Any]) -> str:
-    """One evaluation: its conditions, then all of it, each region and way of lying, the worst."""
+    """One evaluation: its conditions, all of it, by region, ground and orientation, the worst."""
     regions = {f"region {name}": row for name, row in (result.get("per_region") or {}).items()}
-    rows = {"all": result, **regions, **(result.get("per_orientation") or {})}
+    grounds = result.get("per_ground") or {}
+    rows = {"all": result, **regions, **grounds, **(result.get("per_orientation") or {})}
     curves = result.get("per_curve") or {}
     if curves:
         worst = min(curves, key=lambda name: curves[name]["success"])
@@ -140,6 +141,8 @@ def _conditions(of: Mapping[str, Any]) -> str:
     parts += [f"joint noise {of['start_noise_rad']:g} rad", f"durations T x U({low:g}, {high:g})"]
     if of.get("terrain_seed") is not None:
         parts.append(f"ground of seed {of['terrain_seed']}")
+    if of.get("drops") is not None:
+        parts.append(f"bodies as of --drops {of['drops']}")
     if of["blend"] is not None:
         parts.append(f"mixtures of two curves ({of['blend']})")
     if of["push_ns"] is not None:

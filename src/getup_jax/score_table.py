@@ -17,6 +17,7 @@ _SUCCESS = (
     ("interval", "95 %", ""),
     ("success_pushed", "of pushed", "{:.0%}"),
     ("return_rate", "return rate", "{:.2f}"),
+    ("return_rate_total", "total", "{:.2f}"),
     ("height_error_m", "height error m", "{:.3f}"),
     ("angle_error_rad", "angle error rad", "{:.2f}"),
     ("stand_time_s", "stands after s", "{:.1f}"),
@@ -36,7 +37,7 @@ _Columns = tuple[tuple[str, str, str], ...]
 
 
 def table(scores: Scores) -> str:
-    """Two tables with the same rows: one a style, a way of lying and a region, one in total."""
+    """Two tables with the same rows: one a style, a way of lying, a region and kind of ground."""
     success = _SUCCESS
     if math.isnan(scores.success_pushed):
         success = tuple(column for column in _SUCCESS if column[0] != "success_pushed")
@@ -55,6 +56,7 @@ def _view(scores: Scores, columns: _Columns) -> Table:
     _add_rows(view, columns, scores.per_curve or {})
     _add_rows(view, columns, scores.per_orientation or {})
     _add_rows(view, columns, scores.per_region or {})
+    _add_rows(view, columns, scores.per_ground or {})
     _add_rows(view, columns, {"all": scores})
     return view
 

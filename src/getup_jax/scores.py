@@ -11,11 +11,13 @@ import numpy as np
 from scipy.stats import norm
 
 from getup_jax.conditions import orientation
+from getup_jax.grounds import Places, kinds
 from getup_jax.motion.clips import GetUp
 from getup_jax.physics.terrain_map import REGIONS
 from getup_jax.tasks.episode import LYING
 
 ORIENTATIONS = ("supine", "prone", "side")
+_SUMMED = ("task_return", "full_steps")  # of `episode_values`, over all episodes
 STAND_SHARE = 0.9  # of the curve's end: the character stands from when it stays above this
 
 
@@ -26,7 +28,8 @@ class Scores:
     success: float  # share
     success_low: float  # 95 % Wilson interval
     success_high: float
-    return_rate: float  # cumulative task reward / steps of the full episode [P 6.4]
+    return_rate: float  # cumulative task reward / steps of the full episode, mean of the episodes
+    return_rate_total: float  # task reward of all episodes / steps of all full episodes [P 6.4]
     height_error_m: float  # mean |h - p_h| while rising
     angle_error_rad: float  # mean error of the two torso angles while rising
     stand_time_s: float  # until the character stands for good; successful episodes
@@ -43,6 +46,7 @@ class Scores:
     per_orientation: dict[str, Scores] | None = None  # supine, prone, side: how the curve starts
     per_curve: dict[str, Scores] | None = None
     per_region: dict[str, Scores] | None = None  # of irregular ground, where an episode starts
+    per_ground: dict[str, Scores] | None = None  # flat, rough or how steep it is there
 
 
 def score(
@@ -52,12 +56,12 @@ def score(
     control_dt: float,
     stand_time_s: float,
     kind: int = LYING,
-    region: np.ndarray | None = None,
+    places: Places | None = None,
 ) -> Scores:
     """Scores of a trace (see `episodes.Trace`, NumPy leaves [T, N, ...]).
 
     In total, by style, for lying starts by how the body lies, and on irregular ground by region
-    [N], an index into REGIONS.
+    and kind of ground.
     """
     values = episode_values(trace, control_dt, stand_time_s)
     styles = np.array([style.name for style in getups])[getup]
@@ -66,7 +70,8 @@ def score(
         _mean(values),
         per_orientation=_split(values, lies, ORIENTATIONS) if kind == LYING else None,
         per_curve=_split(values, styles, [style.name for style in getups]),
-        per_region=None if region is None else _split(values, np.array(REGIONS)[region], REGIONS),
+        per_region=None if places is None else _split(values, places.region, REGIONS),
+        per_ground=None if places is None else _split(values, places.kind, kinds()),
     )
 
 
@@ -82,15 +87,18 @@ def _split(
 
 
 def episode_values(trace: Any, control_dt: float, stand_time_s: float) -> dict[str, np.ndarray]:
-    """One number an episode [N] of everything that `Scores` averages."""
+    """One number an episode [N] of everything that `Scores` is made of."""
     running, rising = trace.running, trace.running & (trace.time <= trace.duration)
     error = np.abs(trace.features - trace.target)
     success = trace.success.any(axis=0)
     start = trace.time[0] - control_dt  # a standing start begins at the curve's end
     full_steps = np.round((trace.duration[0] + stand_time_s - start) / control_dt)
+    task_return = np.where(running, trace.task_reward, 0.0).sum(axis=0)
     return {
         "success": success.astype(float),
-        "return_rate": np.where(running, trace.task_reward, 0.0).sum(axis=0) / full_steps,
+        "return_rate": task_return / full_steps,
+        "task_return": task_return,
+        "full_steps": full_steps,
         "height_error_m": _masked_mean(error[..., 0], rising),
         "angle_error_rad": _masked_mean(error[..., 1:].mean(axis=-1), rising),
         "stand_time_s": np.where(success, stand_time(trace), np.nan),
@@ -137,7 +145,7 @@ def to_json(scores: Scores) -> dict[str, Any]:
         return None if isinstance(value, float) and math.isnan(value) else value
 
     result = clean(dataclasses.asdict(scores))
-    groups = ("per_orientation", "per_curve", "per_region")
+    groups = ("per_orientation", "per_curve", "per_region", "per_ground")
     for group in groups:
         for part in (result[group] or {}).values():
             for inner in groups:
@@ -148,7 +156,11 @@ def to_json(scores: Scores) -> dict[str, Any]:
 def _mean(values: dict[str, np.ndarray]) -> Scores:
     episodes = len(values["success"])
     low, high = wilson(float(values["success"].sum()), episodes)
-    means: dict[str, Any] = {name: _finite_mean(x) for name, x in values.items()}
+    sums = {name: float(values[name].sum()) for name in _SUMMED}
+    means: dict[str, Any] = {
+        name: _finite_mean(x) for name, x in values.items() if name not in sums
+    }
+    means["return_rate_total"] = sums["task_return"] / sums["full_steps"]
     deepest = values["penetration_max_m"]
     known = np.isfinite(deepest)
     means["penetration_max_m"] = float(deepest[known].max()) if known.any() else math.nan

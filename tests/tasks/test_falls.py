@@ -5,16 +5,28 @@ import numpy as np
 import pytest
 from ground_samples import deepest_contact, lowest_centre
 
-from getup_jax.config import ConfigError
 from getup_jax.nets.prior_data import pose_conditions
-from getup_jax.physics.surface import lift, link_gaps
+from getup_jax.physics.plane import Plane
 from getup_jax.tasks import falls
-from getup_jax.tasks.falls import fall, is_on_ground
+from getup_jax.tasks.falls import DROPS, evenly
+from getup_jax.tasks.lying import Starts
+
+
+def fall(site, count: int, seed: int) -> Starts:
+    """Limp bodies in the irregular regions."""
+    rng = np.random.default_rng(seed)
+    wanted = evenly(count)
+    return falls.fall(site.character, site.ground, wanted, DROPS["limp"], rng, lambda text: None)
+
+
+def on_the_plane(character, count: int, drop: str) -> Starts:
+    rng = np.random.default_rng(0)
+    return falls.fall(character, Plane(), np.array([count]), DROPS[drop], rng, lambda text: None)
 
 
 @pytest.fixture(scope="module")
 def starts(site):
-    return fall(site.character, site.ground, 45, 0, lambda text: None)
+    return fall(site, 45, 0)
 
 
 def test_every_irregular_region_gets_as_many(starts, site):
@@ -48,32 +60,39 @@ def test_they_are_lying(starts, site):
 
 
 def test_the_same_seed_gives_the_same_falls(site):
-    one, two = (fall(site.character, site.ground, 3, 7, lambda text: None) for _ in range(2))
+    one, two = (fall(site, 3, 7) for _ in range(2))
     np.testing.assert_array_equal(one.qpos, two.qpos)
 
 
-def test_a_body_that_floats_or_sinks_is_not_on_the_ground(site):
-    field = site.ground.field()
-    pose = np.tile(site.character.neutral_qpos, (3, 1))
-    pose[:, :2] = [9.0, 13.0]
-    pose = lift(site.character, field, pose, 0.0)
-    np.testing.assert_allclose(link_gaps(site.character, field, pose).min(axis=1), 0.0, atol=1e-4)
-    pose[1, 2] += 0.03
-    pose[2, 2] -= 0.03
-    np.testing.assert_array_equal(is_on_ground(site.character, field, pose), [True, False, False])
+def test_limp_bodies_on_the_plane_lie_in_every_orientation(character):
+    starts = on_the_plane(character, 60, "any")
+    side, front = np.degrees(pose_conditions(starts.qpos, character)[:, 1:]).T
+    assert (front > 150).any()
+    assert (front < 30).any()
+    assert ((front > 50) & (front < 130)).any()
+    assert (side < 60).any()
+    assert (side > 120).any()
+    gap = deepest_contact(character, starts.qpos)
+    assert gap.min() > -0.02
+    assert gap.max() < 0.01
+    assert np.abs(starts.qvel).max() < 0.3
+    np.testing.assert_array_equal(starts.region, 0)
 
 
-def test_falls_that_never_rest_are_an_error(site, monkeypatch):
-    monkeypatch.setattr(falls, "_STILL", 0.0)
-    monkeypatch.setattr(falls, "_ROUNDS", 1)
-    monkeypatch.setattr(falls, "_MOST_FALLS", 1)
-    with pytest.raises(ConfigError, match=r"do not come to rest in the region 'easy'"):
-        fall(site.character, site.ground, 3, 0, lambda text: None)
+def test_the_papers_bodies_fall_on_face_and_back_and_hold_their_pose(character):
+    starts = on_the_plane(character, 40, "paper")
+    side, front = np.degrees(pose_conditions(starts.qpos, character)[:, 1:]).T
+    assert np.abs(side - 90).max() < 10
+    assert ((front < 10) | (front > 170)).all()
+    assert 0.15 < (front > 170).mean() < 0.65  # 40 % of 40
+    moved = np.abs(starts.qpos[:, 7:] - character.neutral_qpos[7:]).sum(axis=1)
+    limp = np.abs(on_the_plane(character, 10, "limp").qpos[:, 7:] - character.neutral_qpos[7:])
+    assert moved.max() < 3.0 < limp.sum(axis=1).min()
 
 
 @pytest.mark.slow
 def test_no_start_of_a_thousand_sinks_floats_or_is_inside_the_ground(site):
-    starts = fall(site.character, site.ground, 1000, 1, lambda text: None)
+    starts = fall(site, 1000, 1)
     gap = deepest_contact(site.character, starts.qpos)
     assert len(gap) == 1000
     assert gap.min() > -0.02

@@ -14,7 +14,7 @@ from getup_jax.nets.prior_data import pose_conditions
 from getup_jax.physics.character import load_character
 from getup_jax.physics.native import NativeEngine
 from getup_jax.physics.surface import link_gaps
-from getup_jax.tasks import draws, early_ends, focus, misfit, practice, region_pool
+from getup_jax.tasks import draws, early_ends, focus, limp, misfit, practice, region_pool
 from getup_jax.tasks.build import assemble
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 
@@ -31,7 +31,8 @@ def uneven_task(character, cache, task=TASK):
     """A get-up task on the small irregular ground."""
     config = dataclasses.replace(CONFIG, task=task, terrain=TERRAIN)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(region_pool, "cache_dir", lambda: cache)
+        for module in (region_pool, limp):
+            patch.setattr(module, "cache_dir", lambda: cache)
         return assemble(config, character, getups(character), neutral_prior(character), print)
 
 
@@ -69,6 +70,23 @@ def test_lying_starts_fit_their_curve(uneven, site):
             assert np.abs(angles - getup.points[0, 1:]).max() <= TASK.curve_match_rad
 
 
+def test_the_flat_region_has_limp_bodies_only_if_asked(uneven, site, character, cache):
+    own = np.abs(rows(uneven, LYING, 0, 0)[:, 7:] - site.character.neutral_qpos[7:])
+    assert own.sum(axis=1).max() < 3.0
+    task = dataclasses.replace(TASK, limp_share=0.6, limp_drops=30)
+    built = uneven_task(character, cache, task)
+    for style, getup in enumerate(built.getups):
+        qpos = rows(built, LYING, 0, style)
+        limp = np.abs(qpos[:, 7:] - site.character.neutral_qpos[7:]).sum(axis=1) > 3.0
+        assert limp.sum() == 3  # of 5 rows
+        np.testing.assert_array_equal(site.ground.region(qpos[:, :2]), 0)
+        angles = pose_conditions(qpos, site.character)[:, 1:]
+        assert np.abs(angles - getup.points[0, 1:]).max() <= TASK.curve_match_rad
+        for region in range(1, 4):  # where all are limp in any case
+            same = rows(uneven, LYING, region, style)
+            np.testing.assert_array_equal(rows(built, LYING, region, style), same)
+
+
 def test_times_are_those_of_the_kind(uneven):
     pool = uneven.world.pool
     time = np.asarray(pool.time)[np.asarray(pool.table)]
@@ -97,7 +115,8 @@ def test_every_region_has_starts_along_the_clip_if_asked(character, site, cache)
 
 
 def test_a_style_that_nothing_fits_is_left_out_of_the_region(uneven, site, cache, monkeypatch):
-    monkeypatch.setattr(region_pool, "cache_dir", lambda: cache)
+    for module in (region_pool, limp):
+        monkeypatch.setattr(module, "cache_dir", lambda: cache)
     clip, curve = getups(site.character)
     odd = curve.points.copy()
     odd[0, 1:] = np.pi / 2, np.pi / 2  # no rag-doll lies upright
@@ -129,16 +148,6 @@ def test_an_evaluation_leaves_out_styles_that_cannot_start(uneven):
     style, row, region = region_pool.region_starts(pool, 4 * ROWS + 4)
     np.testing.assert_array_equal(style[region == 2], 1)
     np.testing.assert_array_equal(row[region == 2], [*range(ROWS), 0])
-
-
-def test_styles_share_the_starts_as_little_as_possible():
-    used, rng = np.zeros(10, int), np.random.default_rng(0)
-    own = np.arange(10) >= 4
-    first = region_pool._least_used(own, used, 3, rng)
-    second = region_pool._least_used(own, used, 3, rng)
-    assert sorted([*first, *second]) == list(range(4, 10))
-    region_pool._least_used(own, used, 7, rng)  # more than there are: one comes twice
-    assert sorted(used) == [0, 0, 0, 0, 2, 2, 2, 2, 2, 3]
 
 
 def test_states_made_in_chunks_are_the_same(engine, character, monkeypatch):

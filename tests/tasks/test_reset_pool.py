@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tiny_task import CONFIG, LATENT, getups
+from tiny_task import CONFIG, LATENT, getups, supine
 
 from getup_jax.config import ConfigError
 from getup_jax.motion import curves
@@ -16,16 +16,22 @@ from getup_jax.nets.prior_data import pose_conditions
 from getup_jax.paths import asset_path
 from getup_jax.tasks.build import say_which_lie
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
+from getup_jax.tasks.lying import Starts
 from getup_jax.tasks.paths import SHIPPED, FoundPath, load_path, load_paths, save_path
-from getup_jax.tasks.reset_pool import angle_gap, build_pool, kind_shares
+from getup_jax.tasks.reset_pool import FlatStarts, angle_gap, build_pool, kind_shares
 
 ACTION = LATENT + 49
 TASK = dataclasses.replace(CONFIG.task, stand_start=0.2, clip_start=0.3, pool_size=60)
 
 
+def make_pool(styles, character, engine, config=TASK, **flat):
+    """The pool of the styles on the flat plane; flat: other arguments of `FlatStarts`."""
+    flat = {"seed": 0, "action_size": ACTION, **flat}
+    return build_pool(FlatStarts(styles, character, config, **flat), engine, print)
+
+
 def pool_of(character, engine, **changes):
-    config = dataclasses.replace(TASK, **changes)
-    return build_pool(getups(character), character, engine, config, seed=0, action_size=ACTION)
+    return make_pool(getups(character), character, engine, dataclasses.replace(TASK, **changes))
 
 
 def rows(pool, kind: int, style: int) -> dict[str, np.ndarray]:
@@ -115,6 +121,41 @@ def test_a_curve_alone_starts_along_the_motion_that_looks_most_like_it(pool, cha
     assert np.abs(start["qvel"][:, 3:6]).max() < limit
 
 
+def limp_bodies(character) -> Starts:
+    """Four bodies on the back, each with another bend of the knee, and one upright."""
+    qpos = np.tile(supine(character), (5, 1))
+    qpos[4] = character.neutral_qpos
+    for number, row in enumerate(qpos):
+        row[7 + character.joint("shin_l_flex")] = 0.1 * number
+    return Starts(qpos, np.full((5, character.model.nv), 0.01), np.zeros(5, int))
+
+
+def test_a_share_of_the_lying_starts_are_limp_bodies_that_fit(pool, character, engine):
+    limp = limp_bodies(character)
+    config = dataclasses.replace(TASK, limp_share=0.4)
+    mixed = make_pool(getups(character), character, engine, config, limp=limp)
+    for style in range(2):
+        start, own = rows(mixed, LYING, style), rows(pool, LYING, style)
+        found = [np.abs(row - limp.qpos).max(axis=1).argmin() for row in start["qpos"][:4]]
+        assert sorted(found) == [0, 1, 2, 3]  # each once, and the upright one does not fit
+        np.testing.assert_allclose(start["qpos"][:4], limp.qpos[found], atol=1e-6)
+        np.testing.assert_allclose(start["qvel"][:4], 0.01)
+        np.testing.assert_array_equal(start["qpos"][4:], own["qpos"][4:])
+    for kind in (STANDING, CLIP):  # and all the others are as without them
+        for name, value in rows(mixed, kind, 0).items():
+            np.testing.assert_array_equal(value, rows(pool, kind, 0)[name])
+
+
+def test_a_style_that_no_limp_body_fits_keeps_its_own_poses(pool, character, engine, capsys):
+    limp = limp_bodies(character).take(np.array([4]))
+    config = dataclasses.replace(TASK, limp_share=1.0)
+    mixed = make_pool(getups(character), character, engine, config, limp=limp)
+    np.testing.assert_array_equal(rows(mixed, LYING, 0)["qpos"], rows(pool, LYING, 0)["qpos"])
+    assert capsys.readouterr().out.strip() == (
+        "start states: no limp body on flat ground fits clip, curve"
+    )
+
+
 def found_path(character, time: np.ndarray) -> FoundPath:
     count = len(time)
     return FoundPath(
@@ -184,15 +225,9 @@ def test_paths_that_cannot_be_used_say_why(character, engine, tmp_path):
         pool_of(character, engine, paths=str(tmp_path / "none"))
     style = getups(character)[0]
     file = save_path(tmp_path, style, found_path(character, np.zeros(2)))
+    config = dataclasses.replace(TASK, paths=str(tmp_path))
     with pytest.raises(ConfigError, match="expected 56 positions and 70 actions, got 56 and 65"):
-        build_pool(
-            getups(character),
-            character,
-            engine,
-            dataclasses.replace(TASK, paths=str(tmp_path)),
-            seed=0,
-            action_size=70,
-        )
+        make_pool(getups(character), character, engine, config, action_size=70)
     file.write_bytes(file.read_bytes()[:100])
     with pytest.raises(ConfigError, match=r"clip\.3\.npz: not a path that getup-search wrote"):
         pool_of(character, engine, paths=str(tmp_path))
@@ -202,7 +237,7 @@ def test_a_curve_unlike_every_frame_starts_lying_instead(character, engine):
     clip, curve = getups(character)
     points = curve.points + np.array([0.5, 0.0, 0.0])
     curve = dataclasses.replace(curve, points=points)
-    pool = build_pool([clip, curve], character, engine, TASK, seed=0, action_size=ACTION)
+    pool = make_pool([clip, curve], character, engine)
     start = rows(pool, CLIP, 1)
     np.testing.assert_array_equal(start["time"], 0.0)
     assert (start["qpos"][:, 2] < 0.15).all()
@@ -230,7 +265,7 @@ def test_a_curve_that_starts_unlike_every_pose_is_an_error(character, engine):
     with pytest.raises(
         ConfigError, match=r"'curve': .* 1\.0\d rad .*task\.curve_match_rad = 0\.52"
     ):
-        build_pool([clip, curve], character, engine, TASK, seed=0, action_size=ACTION)
+        make_pool([clip, curve], character, engine)
 
 
 def test_a_wider_match_accepts_it(character, engine):
@@ -239,9 +274,8 @@ def test_a_wider_match_accepts_it(character, engine):
     points[0, 2] = 1.0
     curve = dataclasses.replace(curve, points=points)
     config = dataclasses.replace(TASK, curve_match_rad=1.2)
-    assert build_pool(
-        [clip, curve], character, engine, config, seed=0, action_size=ACTION
-    ).table.shape == (3, 1, 2, 10)
+    pool = make_pool([clip, curve], character, engine, config)
+    assert pool.table.shape == (3, 1, 2, 10)
 
 
 def test_curves_that_lie_for_long_are_named():

@@ -6,7 +6,7 @@ import numpy as np
 from ground_samples import TERRAIN, make_site
 
 from getup_jax.config import PhysicsConfig
-from getup_jax.tasks.falls import Starts
+from getup_jax.tasks.lying import Starts
 from getup_jax.tasks.start_cache import Request, cached_starts, fingerprint
 
 REQUEST = Request("falls", 2, 0)

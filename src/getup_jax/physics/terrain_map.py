@@ -54,6 +54,11 @@ class TerrainMap:
         inside = ((cell >= 0) & (cell <= 1)).all(axis=-1)
         return np.where(inside, cell[..., 0] + 2 * cell[..., 1], -1)
 
+    def is_sloped(self, xy: np.ndarray) -> np.ndarray:
+        """Whether places xy [..., 2] (m) are in the half of an irregular region that has slopes."""
+        y = np.asarray(xy)[..., 1] % self.region_size
+        return (self.region(xy) > 0) & (y < self.region_size / 2)
+
     def check_spawn(self, xy: np.ndarray) -> None:
         """Raise ConfigError if a place of xy [N, 2] (m) is outside the regions."""
         outside = np.asarray(xy)[self.region(xy) < 0]

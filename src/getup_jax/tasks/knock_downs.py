@@ -12,7 +12,7 @@ from mujoco.batch import Batch, SimulationError
 
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.surface import TOUCH_M, lift
-from getup_jax.tasks.falls import (
+from getup_jax.tasks.lying import (
     Log,
     Place,
     Starts,

@@ -10,8 +10,9 @@ from getup_jax.config import TaskConfig
 from getup_jax.paths import cache_dir
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain_map import REGIONS
-from getup_jax.tasks.falls import DROPS, Log, Place, Starts, evenly, fall
+from getup_jax.tasks.falls import DROPS, evenly, fall
 from getup_jax.tasks.knock_downs import knock_down
+from getup_jax.tasks.lying import Log, Place, Starts
 from getup_jax.tasks.start_cache import Maker, Request, cached_starts
 
 

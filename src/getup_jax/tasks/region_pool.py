@@ -15,8 +15,8 @@ from getup_jax.paths import cache_dir
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
-from getup_jax.tasks.falls import Starts
 from getup_jax.tasks.limp import LimpBodies
+from getup_jax.tasks.lying import Starts
 from getup_jax.tasks.matching import fits, least_used
 from getup_jax.tasks.reset_pool import (
     FlatStarts,

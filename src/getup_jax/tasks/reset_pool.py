@@ -18,7 +18,7 @@ from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.settle import lift_to_ground, settle
 from getup_jax.physics.surface import TOUCH_M
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
-from getup_jax.tasks.falls import Log, Starts
+from getup_jax.tasks.lying import Log, Starts
 from getup_jax.tasks.matching import fits, least_used
 from getup_jax.tasks.paths import FoundPath, load_paths
 from getup_jax.tasks.references import Reference, make_references, velocities

@@ -18,7 +18,7 @@ from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.surface import TOUCH_M, link_gaps
 from getup_jax.physics.terrain import HeightField
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap
-from getup_jax.tasks.falls import Starts
+from getup_jax.tasks.lying import Starts
 
 SIDES = ("l", "r")
 CONTACT_M = 0.01  # a sole touches within this gap

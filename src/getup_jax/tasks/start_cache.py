@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.tasks.falls import Starts
+from getup_jax.tasks.lying import Starts
 
 # Raise it whenever the same model and numbers would give other starts.
 FORMAT = 1
