@@ -136,7 +136,7 @@ def test_a_state_and_its_image_stay_images_under_the_policy(task, learner):
     state = state.replace(
         physics=env.engine.place(qpos, 0.3 * qvel), action=jnp.stack([action, found.action(action)])
     )
-    state = state.replace(observation=env._observe(world, state, env._posture(world, state)))
+    state = state.replace(observation=env._observe(state, env._posture(world, state)))
     policy = learner.init_learner(jax.random.PRNGKey(0)).policy
     # the first actions are nearly zero
     actor = jax.tree.map(lambda x: 3.0 * x, policy.actor)
