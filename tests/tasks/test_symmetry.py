@@ -189,6 +189,7 @@ def test_a_learner_is_equivariant_and_stays_so_while_it_trains(task, learner):
     iterate = jax.jit(learner.iteration)
     for _ in range(2):
         state, metrics = iterate(task.world, state)
+        del metrics["ppo/gradient_cosine"]  # is measured now and then
         losses = [float(x) for name, x in metrics.items() if name.startswith(("loss", "ppo"))]
         assert len(losses) > 3
         assert np.isfinite(losses).all()
