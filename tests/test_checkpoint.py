@@ -3,13 +3,17 @@ from __future__ import annotations
 import dataclasses
 import errno
 import json
+import random
 import resource
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 from checkpoint_samples import assert_same, make_policy, make_state
@@ -44,6 +48,19 @@ def saved(tmp_path_factory) -> Path:
 @pytest.fixture
 def run(saved, tmp_path) -> Path:
     return Path(shutil.copytree(saved, tmp_path / "run"))
+
+
+def assert_nested_same(found: Any, expected: Any) -> None:
+    """Nested dicts and tuples with the same arrays, bit by bit."""
+    if isinstance(expected, dict | tuple):
+        assert type(found) is type(expected)
+        assert len(found) == len(expected)
+        for key in expected if isinstance(expected, dict) else range(len(expected)):
+            assert_nested_same(found[key], expected[key])
+    elif isinstance(expected, np.ndarray):
+        assert (found.dtype, found.tobytes()) == (expected.dtype, expected.tobytes())
+    else:
+        assert found == expected
 
 
 def test_restore_is_bit_equal(saved):
@@ -178,6 +195,138 @@ def test_what_orbax_cannot_read_is_damaged_too(run, monkeypatch):
         load_policy(run / "checkpoints" / "00000004")
 
 
+def only_policy(step: Path) -> tuple:
+    loaded = load_policy(step)
+    return loaded.policy, loaded.prior, loaded.config, loaded.metadata
+
+
+def only_learner(step: Path) -> tuple:
+    restored = restore_learner(step, make_state(0))
+    return storage.to_nested({"state": restored.state}), restored.metadata
+
+
+def unsealed(step: Path) -> None:
+    """The manifest as it was before it covered config.yaml and itself."""
+    file = step / manifest.FILE
+    content = json.loads(file.read_text())
+    assert content.pop("content_sha256")
+    assert content["files"].pop("config.yaml")
+    file.write_text(json.dumps(content, indent=1) + "\n")
+
+
+def outcome(read, step: Path):
+    """What a checkpoint gives, or the text of its refusal."""
+    try:
+        return read(step)
+    except CheckpointError as error:
+        return str(error)
+
+
+def assert_one_line(text: str, file: Path) -> None:
+    """Which file, what is wrong, what to do."""
+    assert text.startswith(f"{file}: ")
+    assert text.endswith("; the checkpoint is damaged; use another one, or a copy of this one")
+    assert "\n" not in text
+
+
+def flips(file: Path, count: int) -> Iterator[None]:
+    """The file with one byte changed, so often; afterwards as it was."""
+    draw, content = random.Random(file.name), file.read_bytes()
+    for _ in range(count):
+        changed = bytearray(content)
+        changed[draw.randrange(len(content))] ^= draw.randrange(1, 256)
+        file.write_bytes(changed)
+        yield
+    file.write_bytes(content)
+
+
+def small_files(step: Path) -> list[Path]:
+    return sorted(p for p in step.rglob("*") if p.is_file() and 0 < p.stat().st_size < 20_000)
+
+
+def test_a_changed_byte_is_refused_in_one_line_or_has_no_effect(run):
+    step = run / "checkpoints" / "00000004"
+    whole = {read: outcome(read, step) for read in (only_policy, only_learner)}
+    readers = {"policy": [only_policy], "learner": [only_learner], "config.yaml": [only_policy]}
+    files, refused = small_files(step), 0
+    assert {file.relative_to(step).parts[0] for file in files} == {*readers, manifest.FILE}
+    for file in files:
+        for _ in flips(file, 150 if file.parent == step else 20):
+            for read in readers.get(file.relative_to(step).parts[0], whole):
+                found = outcome(read, step)
+                if isinstance(found, str):
+                    refused += 1
+                    assert_one_line(found, file)
+                else:
+                    assert_nested_same(found, whole[read])
+    assert refused > 400
+
+
+def test_an_older_manifest_is_never_a_traceback(run, monkeypatch):
+    step = run / "checkpoints" / "00000004"
+    unsealed(step)
+    monkeypatch.setattr(checkpoint, "read_item", lambda folder: {"policy": {}})
+    for file in (step / manifest.FILE, step / manifest.CONFIG):
+        for _ in flips(file, 100):
+            found = outcome(only_policy, step)
+            if isinstance(found, str):
+                assert str(step) in found
+                assert "\n" not in found
+
+
+def test_checkpoints_from_before_config_was_covered_load(run):
+    for name in ("00000003", "00000004"):
+        unsealed(run / "checkpoints" / name)
+    assert load_policy(run).config.seed == 5
+    restored = restore_learner(run / "checkpoints", make_state(0))
+    assert_same(restored.state, make_state(4))
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"seed: 6\n", "expected .* bytes, got 8"),
+        (None, "is missing"),
+    ],
+)
+def test_a_changed_config_falls_back_to_the_checkpoint_before(run, content, problem):
+    file = run / "checkpoints" / "00000004" / "config.yaml"
+    file.unlink() if content is None else file.write_bytes(content)
+    with pytest.warns(RuntimeWarning, match=rf"config\.yaml: {problem}.*going back to .*00000003"):
+        assert load_policy(run).metadata["iteration"] == 3
+    # the training does not read it
+    assert restore_learner(run / "checkpoints", make_state(0)).metadata["iteration"] == 4
+
+
+def test_nul_bytes_in_an_older_config_say_what_to_do(run):
+    step = run / "checkpoints" / "00000004"
+    unsealed(step)
+    file = step / "config.yaml"
+    file.write_bytes(b"\0" * 500)
+    with pytest.raises(CheckpointError) as caught:
+        load_policy(step)
+    assert_one_line(str(caught.value), file)
+    assert ": broken YAML: not text: special characters are not allowed" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({"metadata": {"iteratino": 4}}, "metadata: has no iteration"),
+        ({"files": {"policy/x": {"bytes": 1}}}, "policy/x.*expected bytes and sha256"),
+        ({"files": {"policy/../../x": {"bytes": 1, "sha256": ""}}}, "outside of the checkpoint"),
+        ({"files": []}, r"files: expected dict, got \[\]"),
+        ({"filse": {}}, "has the unknown key 'filse'"),
+        ({"package": None}, "package: expected str, got None"),
+    ],
+)
+def test_a_manifest_of_another_form_is_damaged(run, change, problem):
+    file = run / "checkpoints" / "00000004" / manifest.FILE
+    file.write_text(json.dumps(manifest.sealed(json.loads(file.read_text()) | change)))
+    with pytest.raises(manifest.DamagedError, match=problem):
+        load_policy(file.parent)
+
+
 # --- other formats, shapes and places
 
 
@@ -190,7 +339,7 @@ def test_what_orbax_cannot_read_is_damaged_too(run, monkeypatch):
 )
 def test_another_format_is_an_error_and_no_damage(run, change, message):
     file = run / "checkpoints" / "00000004" / manifest.FILE
-    file.write_text(json.dumps(json.loads(file.read_text()) | change))
+    file.write_text(json.dumps(manifest.sealed(json.loads(file.read_text()) | change)))
     with pytest.raises(CheckpointError, match=message) as caught:
         load_policy(run)
     assert str(file) in str(caught.value)
@@ -211,6 +360,7 @@ def test_a_missing_checkpoint_is_an_error(tmp_path, make, message):
 def test_a_config_of_another_version_is_an_error(run):
     file = run / "checkpoints" / "00000004" / "config.yaml"
     file.write_text(file.read_text() + "new_part: {x: 1}\n")
+    manifest.write(file.parent, {"iteration": 4})
     with pytest.raises(CheckpointError, match=r"new_part: unknown key.*version of getup_jax"):
         load_policy(run)
 
@@ -329,7 +479,10 @@ def test_an_export_is_at_most_5_mb(run, tmp_path, monkeypatch):
 
 
 def test_shipped_policies_load():
-    for folder in asset_path("checkpoints").glob("*/checkpoint.json"):
-        loaded = load_policy(folder.parent)
+    for file in asset_path("checkpoints").glob("*/checkpoint.json"):
+        content = json.loads(file.read_text())
+        assert content == manifest.sealed(content), "the manifest does not cover itself"
+        assert manifest.CONFIG in content["files"]
+        loaded = load_policy(file.parent)
         assert isinstance(loaded.config, Config)
         assert storage.is_finite({"policy": loaded.policy})

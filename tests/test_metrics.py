@@ -11,7 +11,7 @@ from rich.console import Console
 
 from getup_jax.config import ConfigError
 from getup_jax.journal import Journal, means
-from getup_jax.metrics import FILE, TIMES, MetricsWriter, read_metrics
+from getup_jax.metrics import FILE, TIMES, MetricsError, MetricsWriter, read_metrics
 from getup_jax.progress import Display, count, describe, duration
 
 
@@ -71,8 +71,30 @@ def test_a_line_that_a_killed_run_left_unfinished_is_skipped(tmp_path):
 
 def test_a_broken_line_elsewhere_is_an_error_that_names_it(tmp_path):
     (tmp_path / FILE).write_text('{"iteration": 1}\nnonsense\n{"iteration": 3}\n')
-    with pytest.raises(ValueError, match=r"metrics.jsonl, line 2: not a JSON object"):
+    with pytest.raises(MetricsError, match=r"metrics.jsonl, line 2: not a JSON object"):
         read_metrics(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("file", "line", "problem"),
+    [
+        (FILE, b'{"iteratino": 2}', "iteration: expected a number, got None"),
+        (FILE, b'{"iteration": "2"}', "iteration: expected a number, got '2'"),
+        (FILE, b"[2]", r"not a JSON object, but \[2\]"),
+        (FILE, b'{"iteration": 2, "x": \xff}', "not a JSON object: .*utf-8"),
+        (FILE, b"[" * 100_000, "not a JSON object: maximum recursion"),
+        (TIMES, b'{"iteration": 2, "wall": 1}', "wall_s: expected a number, got None"),
+    ],
+)
+def test_a_damaged_line_is_one_line_that_says_what_to_do(tmp_path, file, line, problem):
+    write_lines(tmp_path, 1, 2)
+    lines = (tmp_path / file).read_bytes().splitlines()
+    (tmp_path / file).write_bytes(b"\n".join([lines[0], line, lines[1]]))
+    for read in (read_metrics, lambda folder: MetricsWriter(folder, 2)):
+        with pytest.raises(MetricsError, match=rf"{file}, line 2: {problem}") as caught:
+            read(tmp_path)
+        assert str(caught.value).endswith("; remove the line or start a new run")
+        assert "\n" not in str(caught.value)
 
 
 def test_a_missing_file_is_an_error(tmp_path):

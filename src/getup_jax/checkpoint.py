@@ -1,7 +1,7 @@
 """Checkpoints: written whole or not at all, verified when read, the newest good one wins.
 
     FOLDER/00000120/            one checkpoint, named by its iteration
-        checkpoint.json         format, iteration, steps, and the digest of every array file
+        checkpoint.json         format, iteration, steps, and the digest of every file
         config.yaml             the resolved settings
         policy/                 orbax: {"policy": ..., "prior": ..., "critic": ...}, loadable alone
         learner/                orbax: {"state": the whole TrainState}
@@ -16,20 +16,22 @@ import contextlib
 import dataclasses
 import shutil
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from getup_jax import manifest
 from getup_jax.config import Config, ConfigError
 from getup_jax.manifest import DamagedError
 from getup_jax.paths import asset_path
-from getup_jax.settings import dump_yaml, load_saved_config
+from getup_jax.settings import BrokenFileError, dump_yaml, load_saved_config
 from getup_jax.storage import CheckpointError, from_nested, read_item, to_nested, write_item
 
 CHECKPOINTS = "checkpoints"  # folder of a run that holds its checkpoints
 POLICY, LEARNER = "policy", "learner"  # items of a checkpoint
 MAX_EXPORT_BYTES = 5_000_000
+
+T = TypeVar("T")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,7 +94,7 @@ def save_learner(
 
 def restore_learner(folder: Path, template: Any) -> Restored:
     """The newest undamaged TrainState of a checkpoints folder, in the template's structure."""
-    path, nested, metadata = _read_newest(find_checkpoints(folder), LEARNER)
+    path, nested, metadata = _newest(find_checkpoints(folder), _read_learner)
     state = from_nested({"state": template}, nested, str(path / LEARNER))["state"]
     return Restored(state, metadata, path)
 
@@ -102,7 +104,7 @@ def load_learner(path: str | Path) -> LoadedLearner:
 
     `path` is a run folder, its checkpoints folder or one checkpoint; an exported policy has none.
     """
-    found, nested, _ = _read_newest(find_checkpoints(path), LEARNER)
+    found, nested, _ = _newest(find_checkpoints(path), _read_learner)
     return LoadedLearner(
         nested["state"]["learner"], nested["state"]["environment"], found / LEARNER
     )
@@ -114,14 +116,7 @@ def load_policy(path: str | Path) -> LoadedPolicy:
     `path` is a run folder, its checkpoints folder, one checkpoint, an exported policy, or
     the name of a shipped one. Raises CheckpointError that says what is wrong.
     """
-    found, nested, metadata = _read_newest(find_checkpoints(path), POLICY)
-    try:
-        config = load_saved_config(found / "config.yaml")
-    except ConfigError as error:
-        hint = "it was written with other settings; use the version of getup_jax that wrote it"
-        raise CheckpointError(f"{found}: {error}; {hint}") from None
-    prior, critic = nested.get("prior"), nested.get("critic")
-    return LoadedPolicy(nested["policy"], prior, config, metadata, found, critic)
+    return _newest(find_checkpoints(path), _read_policy)
 
 
 def export_policy(source: str | Path, destination: str | Path) -> Path:
@@ -193,16 +188,26 @@ def _prune(folder: Path, iteration: int, keep: int) -> None:
                 manifest.remove_folder(step)
 
 
-def _read_newest(found: list[Path], item: str) -> tuple[Path, dict[str, Any], dict[str, Any]]:
-    """Path, arrays and metadata of the newest checkpoint whose item is undamaged."""
+def _newest(found: list[Path], read: Callable[[Path], T]) -> T:
+    """What is read of the newest checkpoint that is undamaged."""
     for older, path in reversed(list(zip([None, *found], found, strict=False))):
         try:
-            return path, *_read(path, item)
+            return read(path)
         except DamagedError as error:
             if older is None:
                 raise
             warnings.warn(f"{error}; going back to {older}", RuntimeWarning, stacklevel=3)
     raise CheckpointError("no checkpoint given")
+
+
+def _read_policy(path: Path) -> LoadedPolicy:
+    nested, metadata = _read(path, POLICY)
+    prior, critic = nested.get("prior"), nested.get("critic")
+    return LoadedPolicy(nested["policy"], prior, _read_config(path), metadata, path, critic)
+
+
+def _read_learner(path: Path) -> tuple[Path, dict[str, Any], dict[str, Any]]:
+    return path, *_read(path, LEARNER)
 
 
 def _read(path: Path, item: str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -211,7 +216,19 @@ def _read(path: Path, item: str) -> tuple[dict[str, Any], dict[str, Any]]:
     try:
         return read_item(path / item), metadata
     except Exception as error:
-        raise DamagedError(f"{path / item}: cannot be read: {error}") from error
+        problem = " ".join(str(error).split())
+        raise DamagedError(path / item, f"cannot be read: {problem}") from error
+
+
+def _read_config(path: Path) -> Config:
+    file = manifest.verify_config(path)
+    try:
+        return load_saved_config(file)
+    except BrokenFileError as error:
+        raise DamagedError(file, error.problem) from None
+    except ConfigError as error:
+        hint = "it was written with other settings; use the version of getup_jax that wrote it"
+        raise CheckpointError(f"{path}: {error}; {hint}") from None
 
 
 def _write(
@@ -230,7 +247,7 @@ def _write(
         partial.mkdir()
         for name, nested in items.items():
             write_item(partial / name, nested)
-        (partial / "config.yaml").write_text(dump_yaml(config), encoding="utf-8")
+        (partial / manifest.CONFIG).write_text(dump_yaml(config), encoding="utf-8")
         size = manifest.write(partial, metadata)
         if max_bytes is not None and size > max_bytes:
             raise ValueError(f"{size} bytes, at most {max_bytes} are allowed")

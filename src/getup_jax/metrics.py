@@ -11,16 +11,21 @@ import importlib
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
 from getup_jax.config import ConfigError
+from getup_jax.config.check import shown
 
 FILE = "metrics.jsonl"
 TIMES = "times.jsonl"
 _OWN = ("iteration", "steps", "wall_s")
 _CLOCK = "steps_per_s"  # a metric that belongs to the times
+
+
+class MetricsError(ValueError):
+    """A line of the history is damaged; the text names the file and the line."""
 
 
 class MetricsWriter:
@@ -104,17 +109,36 @@ def _keep(path: Path, last: int) -> list[dict[str, Any]]:
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:
-    """The parsed lines; none where there is no file."""
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    """The parsed lines; none where there is no file.
+
+    A last line that is not JSON was left unfinished.
+    """
+    lines = path.read_bytes().splitlines() if path.exists() else []
+    needed = ("iteration", "wall_s") if path.name == TIMES else ("iteration",)
     rows = []
     for number, line in enumerate(lines, start=1):
         try:
             rows.append(json.loads(line))
-        except ValueError as error:
-            if number < len(lines):
-                problem = f"{path}, line {number}: not a JSON object: {error}"
-                raise ValueError(f"{problem}; remove the line or start a new run") from None
+        except (ValueError, RecursionError) as error:
+            if number == len(lines):
+                break
+            problem = f"not a JSON object: {' '.join(str(error).split())}"
+        else:
+            problem = _problem(rows[-1], needed)
+        if problem is not None:
+            hint = "remove the line or start a new run"
+            raise MetricsError(f"{path}, line {number}: {problem}; {hint}")
     return rows
+
+
+def _problem(row: Any, needed: Sequence[str]) -> str | None:
+    """What is wrong with a parsed line, or None."""
+    if not isinstance(row, dict):
+        return f"not a JSON object, but {shown(row)}"
+    for name in needed:
+        if isinstance(row.get(name), bool) or not isinstance(row.get(name), int | float):
+            return f"{name}: expected a number, got {shown(row.get(name))}"
+    return None
 
 
 def _rewrite(path: Path, rows: list[dict[str, Any]]) -> None:

@@ -30,6 +30,15 @@ RETIRED = {
 _DEEPEST = 10  # names in the key of an override
 
 
+class BrokenFileError(ConfigError):
+    """A config file is not YAML; `problem` is the text without the file's name."""
+
+    def __init__(self, file: Path, error: yaml_text.YamlError) -> None:
+        place = "" if error.line is None else f", line {error.line}"
+        self.problem = f"broken YAML: {error}"
+        super().__init__(f"{file}{place}: {self.problem}")
+
+
 def load_config(path: str | Path | None, overrides: Sequence[str] = ()) -> Config:
     """The defaults, changed by a YAML file (None: by none) and then by overrides.
 
@@ -104,8 +113,7 @@ def _read_yaml(file: Path) -> dict[str, Any]:
     except OSError as error:
         raise ConfigError(f"{file}: cannot be read: {error.strerror or error}") from None
     except yaml_text.YamlError as error:
-        place = "" if error.line is None else f", line {error.line}"
-        raise ConfigError(f"{file}{place}: broken YAML: {error}") from None
+        raise BrokenFileError(file, error) from None
     if values is None:
         return {}
     if not isinstance(values, dict):
