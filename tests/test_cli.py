@@ -1,8 +1,12 @@
 from __future__ import annotations
 
+import importlib
 import os
+import re
+import runpy
 import subprocess
 import sys
+import tomllib
 import types
 import warnings
 from pathlib import Path
@@ -13,6 +17,8 @@ import pytest
 from getup_jax import cli, settings
 from getup_jax.config import ConfigError
 from getup_jax.paths import config_path
+
+ROOT = Path(__file__).parent.parent
 
 
 class FakeTrain(types.ModuleType):
@@ -52,7 +58,7 @@ def test_train_takes_options_between_overrides(calls, capsys):
     assert capsys.readouterr().out == ""
 
 
-@pytest.mark.parametrize(("number", "code"), [(None, 0), (2, 130), (15, 143)])
+@pytest.mark.parametrize(("number", "code"), [(None, 0), (1, 129), (2, 130), (15, 143)])
 def test_the_exit_code_tells_of_a_signal(calls, number, code):
     calls.result = number
     assert cli.train_main(["quick"]) == code
@@ -198,6 +204,32 @@ def test_motion_passes_its_arguments_on(monkeypatch):
     monkeypatch.setitem(sys.modules, "getup_jax.motion.command", module)
     assert cli.motion_main(["list", "x"]) == 0
     assert seen == [["list", "x"]]
+
+
+def test_export_passes_its_arguments_on(monkeypatch):
+    seen = []
+    module = types.SimpleNamespace(main=lambda argv: seen.append(argv) or 0)
+    monkeypatch.setitem(sys.modules, "getup_jax.export", module)
+    assert cli.export_main(["runs/flat", "out"]) == 0
+    assert seen == [["runs/flat", "out"]]
+
+
+def test_every_script_of_the_package_is_there():
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
+    assert {"getup-train", "getup-eval", "getup-export", "getup-motion"} <= scripts.keys()
+    for place in scripts.values():
+        module, _, name = place.partition(":")
+        assert callable(getattr(importlib.import_module(module), name))
+
+
+def test_nothing_tells_to_import_from_the_folder_that_one_stands_in():
+    # `python -m` puts that folder first; the commands, `python -P` and `python FILE` do not
+    told = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "src").rglob("*.py")]
+    unsafe = re.compile(r"python3? -m getup_jax|executable, \"-[mc]\"")
+    found = [str(file) for file in told if unsafe.search(file.read_text(encoding="utf-8"))]
+    assert [Path(file).name for file in found] == ["export.py"]  # which names the command instead
+    with pytest.raises(SystemExit, match="is the command getup-export now"):
+        runpy.run_module("getup_jax.export", run_name="__main__")
 
 
 @pytest.mark.parametrize("main", [cli.train_main, cli.eval_main])

@@ -333,7 +333,7 @@ def test_a_disk_that_is_full_at_the_end_is_an_error(tmp_path, monkeypatch):
 # --- signals
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_saves_and_says_how_to_resume(tmp_path, unbroken, monkeypatch, capsys, number):
     update = Display.update
 

@@ -1,4 +1,4 @@
-"""The commands getup-train, getup-eval, getup-motion and getup-edit.
+"""The commands getup-train, getup-eval, getup-export, getup-motion, getup-edit and getup-search.
 
 What imports JAX is imported where it is used, after the arguments and the settings were
 checked, so that a typing mistake is answered at once.
@@ -42,6 +42,11 @@ def eval_main(argv: Sequence[str] | None = None) -> int:
     return _guard(_evaluate, eval_parser().parse_args(argv))
 
 
+def export_main(argv: Sequence[str] | None = None) -> int:
+    """`getup-export`; returns the exit code."""
+    return _guard(_export, argv)
+
+
 def search_main(argv: Sequence[str] | None = None) -> int:
     """`getup-search`; returns the exit code."""
     return _guard(_search, argv)
@@ -75,6 +80,12 @@ def _evaluate(args: argparse.Namespace) -> int:
     from getup_jax.evaluate import evaluate_command
 
     return evaluate_command(args) or 0
+
+
+def _export(argv: Sequence[str] | None) -> int:
+    from getup_jax.export import main
+
+    return main(argv)
 
 
 def _search(argv: Sequence[str] | None) -> int:

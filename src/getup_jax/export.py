@@ -1,6 +1,6 @@
 """Make a folder to ship out of a run: the policy item alone, and a model card.
 
-    python -m getup_jax.export runs/flat assets/checkpoints/flat --eval eval.json
+    getup-export runs/flat assets/checkpoints/flat --eval eval.json
 
 The folder holds the weights, the pose prior, the resolved config and the format version, is at
 most `checkpoint.MAX_EXPORT_BYTES` large, and is read by `getup-eval --ckpt FOLDER`.
@@ -26,15 +26,9 @@ CARD = "README.md"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """`python -m getup_jax.export`; returns the exit code."""
+    """`getup-export`; returns the exit code. Errors are for the caller to print."""
     args = _parser().parse_args(argv)
-    try:
-        folder = export(args.run, args.out, args.eval, args.machine, args.commit, args.before)
-    except ValueError as error:
-        if not type(error).__module__.startswith("getup_jax."):
-            raise
-        print(f"{type(error).__name__}: {error}", file=sys.stderr)
-        return 2
+    folder = export(args.run, args.out, args.eval, args.machine, args.commit, args.before)
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
     print(f"{folder}: {size / 1e6:.2f} MB; look at {folder / CARD}")
     return 0
@@ -106,7 +100,7 @@ def _commit() -> str | None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m getup_jax.export",
+        prog="getup-export",
         description="Copy a run's policy to a folder of at most "
         f"{checkpoint.MAX_EXPORT_BYTES / 1e6:g} MB, and write its model card.",
     )
@@ -134,4 +128,5 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    # `python -m` imports modules from the folder that one stands in before those of Python
+    sys.exit("python -m getup_jax.export is the command getup-export now, with the same arguments")

@@ -37,12 +37,15 @@ def test_commands_come_in_the_order_of_their_times_with_defaults(tmp_path):
     ("text", "message"),
     [
         ("[1, 2]", "expected a file with duration_s and a list of commands"),
-        ("a: [", "not YAML"),
+        ("a: [", "line 1: not YAML"),
+        ("[" * 5000, "line 1: not YAML: nested more than 40 deep"),
+        ("duration_s: .inf\ncommands: [{at_s: 0, policy: x}]", "duration_s: .*, got inf"),
+        (f"duration_s: {'9' * 400}\ncommands: [{{at_s: 0, policy: x}}]", "a number of over 308"),
         ("duration_s: 5\ncommands: []", "commands: expected at least one"),
         ("duration_s: 5\nsteps: 1\ncommands: [{at_s: 0, policy: x}]", "unknown 'steps'"),
         (
             "duration_s: -5\ncommands: [{at_s: 0, policy: x}]",
-            r"duration_s: .*at least 0\.1, got -5",
+            r"duration_s: .*from 0\.1 to .*, got -5",
         ),
         ("duration_s: 5\ncommands: [{at_s: 0}]", r"commands\[0\]: expected a policy or one of"),
         ("duration_s: 5\ncommands: [{policy: x}]", r"commands\[0\]\.at_s: expected a number"),
@@ -59,7 +62,7 @@ def test_commands_come_in_the_order_of_their_times_with_defaults(tmp_path):
         ),
         (
             "duration_s: 5\ncommands: [{at_s: 0, target_location: {place: [1, x]}}]",
-            "place: expected a number, got 'x'",
+            "place: expected a number from .* to .*, got 'x'",
         ),
         (
             "duration_s: 5\ncommands: [{at_s: 0, aiming: {yaw: 3}}]",

@@ -10,17 +10,18 @@ commands:
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from getup_jax import yaml_text
 from getup_jax.config import ConfigError
+from getup_jax.config.check import shown
+from getup_jax.config.ranges import Range, check
 from getup_jax.tasks.goals.combine import GOALS, check_name
 from getup_jax.tasks.goals.goal import REQUIRED
 
+_MOST = 1e6  # s, m, degrees
 _FORM = "a file with duration_s and a list of commands, see docs/composite.md"
 
 
@@ -53,11 +54,12 @@ class Script:
 def read_script(path: Path) -> Script:
     """Read a command file; ConfigError names the place and what was expected."""
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from None
-    except yaml.YAMLError as error:
-        raise ConfigError(f"{path}: not YAML: {error}") from None
+        content = yaml_text.parse(path.read_bytes())
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except yaml_text.YamlError as error:
+        place = "" if error.line is None else f", line {error.line}"
+        raise ConfigError(f"{path}{place}: not YAML: {error}") from None
     if not isinstance(content, Mapping) or not isinstance(content.get("commands"), list):
         raise ConfigError(f"{path}: expected {_FORM}")
     for key in content:
@@ -74,7 +76,9 @@ def read_script(path: Path) -> Script:
 
 def _command(found: Any, where: str, duration_s: float) -> Command:
     if not isinstance(found, Mapping):
-        raise ConfigError(f"{where}: expected {{at_s: ..., policy or a goal: ...}}, got {found!r}")
+        raise ConfigError(
+            f"{where}: expected {{at_s: ..., policy or a goal: ...}}, got {shown(found)}"
+        )
     for key in found:
         check_name(str(key), ("at_s", "policy", *GOALS), where)
     at_s = _number(found.get("at_s"), f"{where}.at_s", least=0.0)
@@ -82,7 +86,9 @@ def _command(found: Any, where: str, duration_s: float) -> Command:
         raise ConfigError(f"{where}.at_s: expected less than duration_s {duration_s}, got {at_s}")
     policy = found.get("policy")
     if policy is not None and not isinstance(policy, str):
-        raise ConfigError(f"{where}.policy: expected a run folder or a checkpoint, got {policy!r}")
+        raise ConfigError(
+            f"{where}.policy: expected a run folder or a checkpoint, got {shown(policy)}"
+        )
     targets = {
         name: _order(name, found[name], f"{where}.{name}") for name in GOALS if name in found
     }
@@ -97,7 +103,7 @@ def _order(goal: str, found: Any, where: str) -> dict[str, Any]:
     if not known:
         raise ConfigError(f"{where}: cannot be steered; leave it out")
     if not isinstance(found, Mapping):
-        raise ConfigError(f"{where}: expected {{{', '.join(known)}}}, got {found!r}")
+        raise ConfigError(f"{where}: expected {{{', '.join(known)}}}, got {shown(found)}")
     for key in found:
         check_name(str(key), tuple(known), where)
     order = {}
@@ -115,7 +121,7 @@ def _numbers(value: Any, count: int, where: str) -> Any:
     if count == 1:
         return _number(value, where)
     if not isinstance(value, list) or len(value) != count:
-        raise ConfigError(f"{where}: expected {_words(count)}, got {value!r}")
+        raise ConfigError(f"{where}: expected {_words(count)}, got {shown(value)}")
     return tuple(_number(item, where) for item in value)
 
 
@@ -123,9 +129,6 @@ def _words(count: int) -> str:
     return "a number" if count == 1 else f"a list of {count} numbers"
 
 
-def _number(value: Any, where: str, least: float = -math.inf) -> float:
-    good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    if not good or value < least:
-        bound = "" if least == -math.inf else f" of at least {least:g}"
-        raise ConfigError(f"{where}: expected a number{bound}, got {value!r}")
+def _number(value: Any, where: str, least: float = -_MOST) -> float:
+    check(value, float, Range(least=least, most=_MOST), where)
     return float(value)

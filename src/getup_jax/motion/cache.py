@@ -168,7 +168,8 @@ def _run_worker(job: Job) -> tuple[Clip, RetargetReport]:
     A plain command is safe where JAX runs already and in scripts without a main guard, which
     neither fork nor spawn of multiprocessing are.
     """
-    command = [sys.executable, "-m", "getup_jax.motion.worker"]
+    # -P: no module comes from the current folder, which is where people keep their motions
+    command = [sys.executable, "-P", "-m", "getup_jax.motion.worker"]
     process = subprocess.run(command, input=pickle.dumps(job), capture_output=True, check=False)
     if process.returncode:
         text = process.stderr.decode(errors="replace").strip()

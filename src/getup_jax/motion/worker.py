@@ -1,4 +1,4 @@
-"""`python -m getup_jax.motion.worker`: a pickled Job in, its pickled result out."""
+"""`python -P -m getup_jax.motion.worker`: a pickled Job in, its pickled result out."""
 
 from __future__ import annotations
 
