@@ -229,7 +229,7 @@ def test_nothing_tells_to_import_from_the_folder_that_one_stands_in():
     found = [str(file) for file in told if unsafe.search(file.read_text(encoding="utf-8"))]
     assert [Path(file).name for file in found] == ["export.py"]  # which names the command instead
     with pytest.raises(SystemExit, match="is the command getup-export now"):
-        runpy.run_module("getup_jax.export", run_name="__main__")
+        runpy.run_path(str(ROOT / "src/getup_jax/export.py"), run_name="__main__")
 
 
 @pytest.mark.parametrize("main", [cli.train_main, cli.eval_main])
