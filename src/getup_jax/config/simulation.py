@@ -64,7 +64,7 @@ class TerrainConfig:
     # ground varies by .35 m (std), the ground below it on a slope of 10 degrees by .05 m
     relief_gain: float = number(4.0, above=0, most=100)
     # rag-dolls dropped on the irregular regions for lying starts
-    drops: int = number(5000, least=1, most=1_000_000)
+    drops: int = number(5000, least=1, most=200_000)
     curriculum: str = "success"  # what opens the next region: success | schedule | none (all open)
     # success: this many in the newest region
     unlock_successes: int = number(200, least=1, most=MOST_COUNT)

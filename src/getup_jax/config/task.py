@@ -13,7 +13,7 @@ from getup_jax.config.ranges import check_numbers, number
 class TaskConfig:
     """The get-up task: episodes, starts, early ends and the action."""
 
-    stand_time_s: float = number(3.0, above=0, most=3600)  # standing phase after the curve's end
+    stand_time_s: float = number(3.0, above=0, most=600)  # standing phase after the curve's end
     # when the curve targets are seen
     lookahead_s: tuple[float, ...] = number((0.0, 0.1, 0.2, 0.3), least=0, most=60, length=(1, 32))
     filter: float = number(0.2, above=0, most=1)  # share of the new action in the filtered one
@@ -72,7 +72,7 @@ class TaskConfig:
     # of drawn curves: T x U(low, high)
     duration_range: tuple[float, float] = number((0.75, 1.3), above=0, most=100, length=2)
     start_noise_rad: float = number(0.0, least=0, most=math.pi)  # joint noise of the start poses
-    pool_size: int = number(2048, least=1, most=1_000_000)  # start states made once
+    pool_size: int = number(2048, least=1, most=262_144)  # start states made once
     # lying starts rest this long before the pool keeps them
     settle_s: float = number(0.5, least=0, most=3600)
     # share of the lying starts on flat ground that are limp bodies, not the motions' own poses; on
