@@ -11,11 +11,14 @@ from tiny_task import CONFIG, LATENT, getups, untrained_prior
 
 from getup_jax import mirror
 from getup_jax.algo.learner import Learner, make_learner
+from getup_jax.checkpoint import CHECKPOINTS, load_policy, restore_learner, save_learner
 from getup_jax.config import CompositeConfig, GroupConfig, NetworkConfig, PhysicsConfig
 from getup_jax.mirror import AXIAL, POLAR, Symmetry, concatenated, signed
+from getup_jax.nets.prior import from_dict, to_dict
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.mirror_image import joint_mirror
 from getup_jax.physics.native import NativeEngine
+from getup_jax.storage import from_nested
 from getup_jax.tasks.build import BuiltTask, assemble
 from getup_jax.tasks.observation import Observer
 from getup_jax.tasks.symmetry import action_mirror, find_symmetry, observation_mirror
@@ -133,10 +136,9 @@ def test_a_state_and_its_image_stay_images_under_the_policy(task, learner):
     qpos, qvel = mirrored_pair(env.character, seed=4)
     state = env.start(world, jnp.arange(2), *jnp.zeros((2, 2), jnp.int32))
     action = 0.3 * jax.random.normal(jax.random.PRNGKey(3), (65,))
-    state = state.replace(
-        physics=env.engine.place(qpos, 0.3 * qvel), action=jnp.stack([action, found.action(action)])
-    )
-    state = state.replace(observation=env._observe(state, env._posture(world, state)))
+    first = jnp.stack([action, found.action(action)])
+    state = state.replace(physics=env.engine.place(qpos, 0.3 * qvel), action=first)
+    state, _ = env.advance(world, state, first)  # now it is observed
     policy = learner.init_learner(jax.random.PRNGKey(0)).policy
     # the first actions are nearly zero
     actor = jax.tree.map(lambda x: 3.0 * x, policy.actor)
@@ -189,9 +191,8 @@ def test_a_learner_is_equivariant_and_stays_so_while_it_trains(task, learner):
     iterate = jax.jit(learner.iteration)
     for _ in range(2):
         state, metrics = iterate(task.world, state)
-        del metrics["ppo/gradient_cosine"]  # is measured now and then
-        losses = [float(x) for name, x in metrics.items() if name.startswith(("loss", "ppo"))]
-        assert len(losses) > 3
+        losses = [float(x) for name, x in metrics.items() if name.startswith("loss/")]
+        assert losses
         assert np.isfinite(losses).all()
     before = learner.init(task.world, jax.random.PRNGKey(0)).learner.policy.actor
     changed = jax.tree.map(lambda a, b: bool((a != b).any()), before, state.learner.policy.actor)
@@ -226,3 +227,29 @@ def test_without_a_prior_the_action_is_offsets_alone(character):
     found = find_symmetry(CONFIG, character, observer, None)
     assert found is not None
     assert (found.action.size, found.observation.size) == (49, 352 - 16)
+
+
+def test_a_mirrored_run_is_restored_and_goes_on_bit_for_bit(task, learner, tmp_path):
+    iterate = jax.jit(learner.iteration)
+    state, _ = iterate(task.world, learner.init(task.world, jax.random.PRNGKey(0)))
+    item = {"policy": state.learner.policy, "prior": to_dict(task.world.prior)}
+    save_learner(tmp_path / CHECKPOINTS, 1, state, NEWTON, item, {})
+    template = learner.init(task.world, jax.random.PRNGKey(1))
+    restored = restore_learner(tmp_path / CHECKPOINTS, template).state
+    for _ in range(2):
+        state, _ = iterate(task.world, state)
+        restored, _ = iterate(task.world, restored)
+    assert jax.tree.all(jax.tree.map(np.array_equal, state, restored))
+    loaded = load_policy(tmp_path)
+    assert loaded.config.network.mirror
+    prior = from_dict(loaded.prior)
+    env = task.environment
+    found = find_symmetry(loaded.config, env.character, env.observer, prior)
+    assert found is not None
+    np.testing.assert_array_equal(found.observation.index, symmetry_of(task).observation.index)
+    policy = from_nested(template.learner.policy, loaded.policy, "here")
+    seen = state.environment.observation
+    action = learner.act(policy, seen)
+    np.testing.assert_allclose(
+        learner.act(policy, found.observation(seen)), found.action(action), atol=1e-5
+    )
