@@ -8,12 +8,13 @@ from motion_samples import PRONE, SUPINE, getup_clip, random_pose
 from scipy.spatial.transform import Rotation
 
 from getup_jax.motion.body import body_of, record
+from getup_jax.motion.bones import guess_unit
 from getup_jax.motion.bvh import BvhOptions, read_bvh
 from getup_jax.motion.clips import Clip, MotionError
 from getup_jax.motion.events import link_positions
 from getup_jax.motion.names import map_names
 from getup_jax.motion.readers import read_motion
-from getup_jax.motion.retarget import RetargetSettings, guess_unit, lift, retarget, starts_in_t_pose
+from getup_jax.motion.retarget import RetargetSettings, lift, retarget, starts_in_t_pose
 from getup_jax.motion.skeleton import cut, scaled
 from getup_jax.motion.solver import SolverSettings
 

@@ -7,17 +7,23 @@ Rotations apply in the order in which the channels are listed, the first one out
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from getup_jax.motion.bvh_header import Header, read_header
+from getup_jax.motion.bvh_header import Joint, read_hierarchy
+from getup_jax.motion.bvh_rows import read_rows, read_timing
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.skeleton import Recording, scaled, turned
+from getup_jax.motion.text import read_lines
+from getup_jax.motion.upright import vertical_axis
 
 Y_UP = Rotation.from_euler("x", 90, degrees=True)  # file axes (Y up) to ours (Z up)
-OFF_BY_ONE = 1  # rows that a writer may forget: a file that lacks more has lost a part
+_MOST_POSES = 20_000_000  # frames times joints
+_DISPLACED = 0.05  # position channels of less than this share of the OFFSETs add to them
+_STEADY = 0.2  # a joint that moves by less than this share of its distance is at a bone's end
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,89 +31,38 @@ class BvhOptions:
     """How to read what a BVH file does not say."""
 
     metres: float | None = None  # size of the file's unit; None: from the leg length
-    up: str = "y"  # y | z, the file's vertical axis
+    up: str = "auto"  # y | z, the file's vertical axis; auto: along its skeleton, else y
     allow_short: bool = False  # take files that lack many rows, or have more than the header says
+    fps: float | None = None  # in place of the file's frame time
 
 
 def read_bvh(path: str | Path, options: BvhOptions = BvhOptions()) -> Recording:
     """The motion of a BVH file; MotionError names the file, the line and the joint."""
     path = Path(path)
-    lines = _lines(path)
-    header = read_header(path, lines)
-    rows, warnings = _rows(path, header, lines, options.allow_short)
-    raw = _decode(path, header, rows)
-    recording = turned(raw, Y_UP) if options.up == "y" else raw
-    return scaled(recording, options.metres or 1.0).warn(*warnings)
+    lines = read_lines(path)
+    joints, last = read_hierarchy(path.name, lines)
+    timing = read_timing(path.name, lines, last, options.fps)
+    rows, warnings = read_rows(path.name, joints, timing, lines, options.allow_short)
+    if len(rows) * len(joints) > _MOST_POSES:
+        raise MotionError(
+            f"{path.name}: {len(rows):,} frames of {len(joints):,} joints are too much at once; "
+            "cut the file"
+        )
+    raw = _decode(path, joints, rows, 1.0 / timing.frame_time).warn(*warnings)
+    up = (vertical_axis(raw) or "y") if options.up == "auto" else options.up
+    recording = turned(raw, Y_UP) if up == "y" else raw
+    return scaled(recording, options.metres or 1.0)
 
 
-def _lines(path: Path) -> list[str]:
-    try:
-        return path.read_text(encoding="utf-8", errors="strict").splitlines()
-    except OSError as error:
-        raise MotionError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise MotionError(f"{path}: expected a BVH text file, got binary data") from None
-
-
-def _rows(
-    path: Path, header: Header, lines: list[str], allow_short: bool
-) -> tuple[np.ndarray, list[str]]:
-    """The channel values [F, C] and the warnings."""
-    found = [(number, line) for number, line in enumerate(lines, 1) if number > header.last_line]
-    found = [(number, line.split()) for number, line in found if line.strip()]
-    warnings = []
-    if len(found) != header.frames:
-        counts = f"header says {header.frames} frames, file has {len(found)} rows"
-        tolerated = allow_short or header.frames - len(found) == OFF_BY_ONE
-        if not tolerated or not found:
-            hint = "fix the header" + (" or pass --allow-short" if found else "")
-            raise MotionError(f"{path.name}: {counts}; {hint}")
-        warnings.append(f"{counts}; {min(len(found), header.frames)} frames are used")
-        found = found[: header.frames] if header.frames else found
-    for number, row in found:
-        if len(row) != header.channels:
-            raise MotionError(
-                f"{path.name}, line {number}: expected {header.channels} values, one a channel, "
-                f"got {len(row)}; the row is damaged"
-            )
-    try:
-        values = np.array([row for _, row in found], dtype=np.float64)
-    except ValueError:
-        values = None
-    if values is None or not np.isfinite(values).all():
-        raise _bad_value(path, header, found)
-    return values, warnings
-
-
-def _bad_value(path: Path, header: Header, rows: list[tuple[int, list[str]]]) -> MotionError:
-    """The error for the first entry that is not a finite number."""
-    names = [f"{j.name} {channel}" for j in header.joints for channel in j.channels]
-    for number, row in rows:
-        for name, text in zip(names, row, strict=True):
-            if not _is_finite(text):
-                return MotionError(
-                    f"{path.name}, line {number}, joint {name}: expected a finite number, "
-                    f"got {text!r}; mend or remove that frame"
-                )
-    return MotionError(f"{path.name}: expected finite numbers in every row")
-
-
-def _is_finite(text: str) -> bool:
-    try:
-        return bool(np.isfinite(float(text)))
-    except ValueError:
-        return False
-
-
-def _decode(path: Path, header: Header, rows: np.ndarray) -> Recording:
+def _decode(path: Path, joints: Sequence[Joint], rows: np.ndarray, fps: float) -> Recording:
     """Channel values to local translations and rotations, in file axes and units."""
-    count, frames = len(header.joints), len(rows)
-    offsets = np.array([joint.offset for joint in header.joints])
+    count, frames = len(joints), len(rows)
+    offsets = np.array([joint.offset for joint in joints])
     translations = np.tile(offsets, (frames, 1, 1))
     rotations = np.zeros((frames, count, 4))
     rotations[..., 0] = 1.0
     column = 0
-    for index, joint in enumerate(header.joints):
+    for index, joint in enumerate(joints):
         values = rows[:, column : column + len(joint.channels)]
         column += len(joint.channels)
         for k, channel in enumerate(joint.channels):
@@ -118,14 +73,48 @@ def _decode(path: Path, header: Header, rows: np.ndarray) -> Recording:
             order = "".join(joint.channels[k][0] for k in turns)
             turn = Rotation.from_euler(order, values[:, turns], degrees=True)
             rotations[:, index] = turn.as_quat(scalar_first=True)
-    return Recording(
+    recording = Recording(
         name=path.stem,
-        fps=1.0 / header.frame_time,
-        joint_names=tuple(joint.name for joint in header.joints),
-        parents=tuple(joint.parent for joint in header.joints),
+        fps=fps,
+        joint_names=tuple(joint.name for joint in joints),
+        parents=tuple(joint.parent for joint in joints),
         offsets=offsets,
         translations=translations,
         rotations=rotations,
-        ends={i: np.array(j.end) for i, j in enumerate(header.joints) if j.end is not None},
+        ends={i: np.array(j.end) for i, j in enumerate(joints) if j.end is not None},
         source=str(path),
     )
+    return _placed(recording, joints)
+
+
+def _placed(recording: Recording, joints: Sequence[Joint]) -> Recording:
+    """The places of inner joints that have position channels.
+
+    By the format they stand in place of the OFFSET. Where a file has no OFFSETs, they are the
+    bones. Where they are next to nothing beside the OFFSETs, they were meant to add to them.
+    """
+    placed = [any(channel.endswith("position") for channel in j.channels) for j in joints]
+    if not any(placed):
+        return recording.warn("no joint has position channels: the body turns about one place")
+    inner = [i for i, joint in enumerate(joints) if placed[i] and joint.parent >= 0]
+    if not inner:
+        return recording
+    offsets, translations = recording.offsets.copy(), recording.translations.copy()
+    typical = np.median(translations[:, inner], axis=0)
+    length, moved = (np.linalg.norm(place, axis=-1) for place in (offsets[inner], typical))
+    wander = np.linalg.norm(translations[:, inner] - typical, axis=-1).max(axis=0)
+    known = length > 0
+    collapsed = known & (np.maximum(moved, wander) < _DISPLACED * length)
+    if collapsed.sum() > 0.8 * known.sum():
+        shifted = [joint for joint, is_one in zip(inner, collapsed, strict=True) if is_one]
+        translations[:, shifted] += offsets[shifted]
+        names = ", ".join(joints[joint].name for joint in shifted[:3])
+        more = " and others" if len(shifted) > 3 else ""
+        recording = recording.warn(
+            f"the position channels of {names}{more} are nothing beside their OFFSETs, so they "
+            "are taken to add to them"
+        )
+    for k, joint in enumerate(inner):
+        if not known[k] and wander[k] < _STEADY * moved[k]:
+            offsets[joint] = typical[k]
+    return dataclasses.replace(recording, offsets=offsets, translations=translations)

@@ -1,16 +1,29 @@
-"""The HIERARCHY part of BVH files, with errors that name file, line and joint."""
+"""The HIERARCHY part of BVH files, with errors that name file, line and joint.
+
+It is read as a stream of words: keywords in any case, braces anywhere, values over several lines.
+A name is all that stands between ROOT or JOINT and the end of its line or the brace.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
-from pathlib import Path
-
-import numpy as np
+import re
+from collections.abc import Iterator, Sequence
 
 from getup_jax.motion.clips import MotionError
+from getup_jax.motion.text import number, said
 
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
+MOST_JOINTS = 2000  # ten times a body with fingers, face and clothes
+_BY_SPELLING = {name.lower(): name for name in CHANNELS}
+_NAMED = ("ROOT", "JOINT", "END")
+_KEYWORDS = {name: name for name in (*_NAMED, "OFFSET", "CHANNELS", "MOTION")}
+_KEYWORDS["ENDSITE"] = "END"
+_MOST_WORDS = 100  # of one statement
+_WORD = re.compile(r"[{}]|[^\s{}]+")
+_COMMENT = re.compile(r"(?:^|\s)(?:#|//|;).*")
+_LONGEST_NAME = 200  # characters
 
 
 @dataclasses.dataclass
@@ -24,70 +37,32 @@ class Joint:
     end: tuple[float, ...] | None = None  # the offset of its End Site
 
 
-@dataclasses.dataclass(frozen=True)
-class Header:
-    """All that comes before the rows."""
-
-    joints: list[Joint]
-    frames: int
-    frame_time: float  # s
-    last_line: int  # 1-based line number of `Frame Time`
-
-    @property
-    def channels(self) -> int:
-        """Values in a row."""
-        return sum(len(joint.channels) for joint in self.joints)
+def without_comment(line: str) -> str:
+    """A line up to `#`, `//` or `;` at the start of a word."""
+    return _COMMENT.sub("", line) if "#" in line or "//" in line or ";" in line else line
 
 
-def read_header(path: Path, lines: list[str]) -> Header:
-    """Parse up to and with the line `Frame Time`."""
-    if not lines or lines[0].strip().upper() != "HIERARCHY":
-        first = lines[0].strip()[:40] if lines else "an empty file"
-        raise MotionError(f"{path.name}, line 1: expected HIERARCHY, got {first!r}; not a BVH file")
-    parser = _Parser(path.name)
-    for number, line in enumerate(lines[1:], 2):
-        words = line.split()
-        if words and words[0] == "MOTION":
-            parser.finish(number)
-            return _motion(path, parser.joints, lines, number)
-        if words:
-            parser.feed(number, words)
-    raise MotionError(f"{path.name}: expected a MOTION section, got none; the file is cut off")
+def read_hierarchy(name: str, lines: Sequence[str]) -> tuple[list[Joint], int]:
+    """The joints, and the number of lines up to and with MOTION; `name` is the file's."""
+    parser = _Parser(name)
+    for at, line in enumerate(lines, 1):
+        if parser.feed(at, _words(without_comment(line))):
+            return parser.joints, at
+    if not parser.begun:
+        raise MotionError(f"{name}: expected HIERARCHY, got an empty file; not a BVH file")
+    raise MotionError(f"{name}: expected a MOTION section, got none; the file is cut off")
 
 
-def _motion(path: Path, joints: list[Joint], lines: list[str], number: int) -> Header:
-    """`Frames: n` and `Frame Time: s` after line `number`."""
-    found: dict[str, tuple[int, str]] = {}
-    for at, line in enumerate(lines[number:], number + 1):
-        key, colon, value = line.partition(":")
-        if colon:
-            found[key.strip().lower()] = (at, value.strip())
-        if "frame time" in found or (line.strip() and not colon):
-            break
-    for key in ("frames", "frame time"):
-        if key not in found:
-            raise MotionError(f"{path.name}, after line {number}: expected '{key.title()}:'")
-    at, text = found["frames"]
-    frames = _number(path.name, at, "Frames", text)
-    last, text = found["frame time"]
-    frame_time = _number(path.name, last, "Frame Time", text)
-    if frame_time <= 0:
-        raise MotionError(
-            f"{path.name}, line {last}: expected a frame time above 0 s, got {text}; "
-            "write 0.033333 for 30 frames a second"
-        )
-    if frames < 0 or frames != int(frames):
-        raise MotionError(f"{path.name}, line {at}: expected a whole frame count, got {frames}")
-    return Header(joints, int(frames), frame_time, last)
+def _words(line: str) -> Iterator[str]:
+    return (match.group() for match in _WORD.finditer(line))
 
 
-def _number(file: str, line: int, what: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise MotionError(f"{file}, line {line}: {what}: expected a finite number, got {text!r}")
+def number_of(file: str, line: int, what: str, text: str) -> float:
+    """The finite number that a word says."""
+    value = number(text)
+    if value is None:
+        got = said(text)
+        raise MotionError(f"{file}, line {line}: {what}: expected a finite number, got {got}")
     return value
 
 
@@ -97,31 +72,61 @@ class _Parser:
     def __init__(self, file: str) -> None:
         self.file = file
         self.joints: list[Joint] = []
+        self.begun = False
         self._stack: list[int] = []  # open braces: joint index, or -1 for an End Site
         self._next: int | None = None  # what the next brace opens
+        self._key, self._line = "", 0  # the open statement, and where it began
+        self._words: list[str] = []
 
-    def feed(self, number: int, words: list[str]) -> None:
-        """One line's words."""
-        key = words[0]
+    def feed(self, number: int, words: Iterator[str]) -> bool:
+        """One line's words; True at MOTION."""
+        for word in words:
+            keyword = word.upper().rstrip(":")
+            if not self.begun:
+                if keyword != "HIERARCHY":
+                    self._fail(number, f"expected HIERARCHY, got {said(word)}; not a BVH file")
+                self.begun = True
+            elif word in "{}":
+                self._close()
+                self._brace(number, word)
+            elif self._key in _NAMED and (self._line == number or not self._words):
+                self._take(number, word)
+            elif keyword in _KEYWORDS:
+                self._close()
+                if keyword == "MOTION":
+                    self._finish(number)
+                    return True
+                self._key, self._line, self._words = _KEYWORDS[keyword], number, []
+            else:
+                self._take(number, word)
+        return False
+
+    def _take(self, number: int, word: str) -> None:
+        """A word of the open statement."""
+        if not self._key:
+            expected = "expected ROOT, JOINT, End Site, OFFSET or CHANNELS"
+            self._fail(number, f"{expected}, got {said(word)}")
+        if len(self._words) >= _MOST_WORDS:
+            self._fail(self._line, f"{self._key}: expected at most {_MOST_WORDS} words, got more")
+        self._words.append(word)
+
+    def _close(self) -> None:
+        """Read the statement that ends here."""
+        key, self._key = self._key, ""
+        if key and self._next is not None:
+            self._fail(self._line, f"expected an opening brace before {key}")
         if key in ("ROOT", "JOINT"):
-            self._open_joint(number, " ".join(words[1:]), key)
-        elif key == "End":
+            self._open_joint(self._line, " ".join(self._words), key)
+        elif key == "END":
             self._next = -1
-        elif key == "{":
-            self._brace(number)
-        elif key == "}":
-            if not self._stack:
-                self._fail(number, "a closing brace without an opening one")
-            self._stack.pop()
         elif key == "OFFSET":
-            self._offset(number, words[1:])
+            self._offset(self._line, self._words)
         elif key == "CHANNELS":
-            self._channels(number, words[1:])
-        else:
-            self._fail(number, f"expected ROOT, JOINT, End Site, OFFSET or CHANNELS, got {key!r}")
+            self._channels(self._line, self._words)
 
-    def finish(self, number: int) -> None:
-        """Checks at the end of the hierarchy."""
+    def _finish(self, number: int) -> None:
+        if self._next is not None:
+            self._fail(number, "expected an opening brace, got MOTION")
         if self._stack:
             self._fail(number, f"{len(self._stack)} braces are still open")
         if not self.joints:
@@ -129,44 +134,70 @@ class _Parser:
 
     def _open_joint(self, number: int, name: str, key: str) -> None:
         parent = self._stack[-1] if self._stack else -1
-        if key == "ROOT" and self.joints:
-            self._fail(number, f"a second ROOT {name}; one skeleton a file, please")
         if key == "JOINT" and parent < 0:
             self._fail(number, f"JOINT {name} has no parent")
-        if any(joint.name == name for joint in self.joints):
-            self._fail(number, f"joint {name} appears twice; rename one")
+        if key == "ROOT" and self._stack:
+            self._fail(number, f"ROOT {name}: {len(self._stack)} braces are still open")
+        if len(self.joints) >= MOST_JOINTS:
+            self._fail(number, f"expected at most {MOST_JOINTS} joints, got more; no human body")
         self._next = len(self.joints)
+        name = name.strip("\"'")[:_LONGEST_NAME] or f"joint {self._next}"
         self.joints.append(Joint(name, parent))
 
-    def _brace(self, number: int) -> None:
-        if self._next is None:
+    def _brace(self, number: int, brace: str) -> None:
+        if brace == "{" and self._next is None:
             self._fail(number, "an opening brace without ROOT, JOINT or End Site")
+        if brace == "}" and self._next is not None:
+            self._fail(number, "expected an opening brace, got a closing one")
+        if brace == "}" and not self._stack:
+            self._fail(number, "a closing brace without an opening one")
+        if self._next is None:
+            self._stack.pop()
         else:
             self._stack.append(self._next)
             self._next = None
 
-    def _offset(self, number: int, words: list[str]) -> None:
-        values = tuple(_number(self.file, number, "OFFSET", word) for word in words)
-        if len(values) != 3 or not self._stack:
-            self._fail(number, f"OFFSET: expected 3 numbers inside a joint, got {len(values)}")
+    def _offset(self, number: int, words: Sequence[str]) -> None:
+        values = tuple(number_of(self.file, number, "OFFSET", word) for word in words)
+        if not self._stack:
+            self._fail(number, "OFFSET outside a joint")
+        joint = self._joint()
+        if len(values) != 3:
+            got = f"expected 3 numbers inside a joint, got {len(values)}"
+            self._fail(number, f"joint {joint.name}: OFFSET: {got}")
         if self._stack[-1] < 0:
-            self.joints[self._stack[-2]].end = values
+            joint.end = values
         else:
-            self.joints[self._stack[-1]].offset = values
+            joint.offset = values
 
-    def _channels(self, number: int, words: list[str]) -> None:
-        names = tuple(words[1:])
-        if not self._stack or self._stack[-1] < 0:
+    def _channels(self, number: int, words: Sequence[str]) -> None:
+        names = tuple(_BY_SPELLING.get(word.lower(), word) for word in words[1:])
+        if not self._stack:
             self._fail(number, "CHANNELS outside a joint")
-        joint = self.joints[self._stack[-1]]
+        if self._stack[-1] < 0 and names:
+            self._stack[-1] = self._moving_end()
+        joint = self._joint()
         if not words or words[0] != str(len(names)):
             self._fail(number, f"joint {joint.name}: CHANNELS says {words[:1]}, lists {len(names)}")
         for name in names:
-            if name not in CHANNELS:
-                close = difflib.get_close_matches(name, CHANNELS, n=1)
+            if name not in CHANNELS or names.count(name) > 1:
+                close = difflib.get_close_matches(name, set(CHANNELS) - set(names), n=1)
                 hint = f"; did you mean {close[0]}?" if close else ""
-                self._fail(number, f"joint {joint.name}: unknown channel {name!r}{hint}")
-        joint.channels = names
+                kind = "unknown channel" if name not in CHANNELS else "twice the channel"
+                self._fail(number, f"joint {joint.name}: {kind} {said(name)}{hint}")
+        if self._stack[-1] >= 0:
+            joint.channels = names
+
+    def _joint(self) -> Joint:
+        """The innermost open joint."""
+        return self.joints[next(index for index in reversed(self._stack) if index >= 0)]
+
+    def _moving_end(self) -> int:
+        """An End Site with channels of its own is a joint."""
+        above = self._stack[-2]
+        parent = self.joints[above]
+        self.joints.append(Joint(f"{parent.name} end", above, parent.end or (0.0, 0.0, 0.0)))
+        return len(self.joints) - 1
 
     def _fail(self, number: int, text: str) -> None:
         raise MotionError(f"{self.file}, line {number}: {text}")

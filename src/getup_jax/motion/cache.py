@@ -23,13 +23,15 @@ import numpy as np
 from getup_jax.motion import readers
 from getup_jax.motion.clips import Clip, MotionError
 from getup_jax.motion.retarget import RetargetReport, RetargetSettings, retarget
+from getup_jax.motion.text import read_bytes
 from getup_jax.paths import cache_dir
 from getup_jax.physics.character import CharacterSpec
 
 # Code whose change makes other clips out of the same files.
 _CODE = (
-    *("asf_amc", "axes", "body", "branches", "bvh", "bvh_header", "calibrate", "composite_json"),
-    *("deepmimic", "jacobian", "names", "readers", "retarget", "skeleton", "solver", "targets"),
+    *("asf_amc", "axes", "body", "bones", "branches", "bvh", "bvh_header", "bvh_rows"),
+    *("calibrate", "composite_json", "deepmimic", "identify", "jacobian", "names", "prefixes"),
+    *("readers", "retarget", "skeleton", "solver", "targets", "text", "upright"),
 )
 _SHAPE = (
     *("body_parentid", "body_pos", "body_quat", "geom_bodyid", "geom_type", "geom_size"),
@@ -77,12 +79,8 @@ def retarget_files(
 def key(job: Job) -> str:
     """The hash that a job's clip is kept under."""
     digest = hashlib.sha256()
-    try:
-        digest.update(job.path.read_bytes())
-    except OSError as error:
-        raise MotionError(f"{job.path}: cannot be read: {error.strerror or error}") from None
-    for extra in _companions(job.path):
-        digest.update(extra.read_bytes())
+    for file in (job.path, *_companions(job.path)):
+        digest.update(read_bytes(file))
     digest.update(job.path.name.encode())
     digest.update(repr((job.read, job.settings, job.character.link_names)).encode())
     digest.update(repr(job.character.joint_names).encode())
@@ -187,4 +185,4 @@ def _file(job: Job) -> Path:
 def _companions(path: Path) -> Iterator[Path]:
     """Other files that a motion file needs: the .asf skeletons beside an .amc."""
     if path.suffix.lower() == ".amc":
-        yield from sorted(path.parent.glob("*.asf"))
+        yield from sorted(f for f in path.parent.iterdir() if f.suffix.lower() == ".asf")

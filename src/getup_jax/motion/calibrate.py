@@ -9,11 +9,12 @@ the same pose when these frames are equal. Where the zero pose of a recording is
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from getup_jax.motion.axes import frame_of, shortest_turn
+from getup_jax.motion.clips import MotionError
 from getup_jax.motion.skeleton import Recording, forward, rest_positions
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -23,15 +24,28 @@ _CHILD = {
     **{"shoulder": "arm", "arm": "forearm", "forearm": "hand"},
 }
 _TRUNK = ("spine_low", "spine_mid", "spine_upper", "neck", "head")
+_NOTHING = 1e-3  # of the skeleton's longest bone: no length, no direction
 _LEAST_BEND = 0.02  # mean squared sine of a knee or elbow that shows its axis
 
 
 def anatomical_frames(recording: Recording, links: Mapping[str, int]) -> dict[str, np.ndarray]:
-    """{link: [3, 3]} columns forward, left, up of the link in its joint's own axes."""
+    """{link: [3, 3]} columns forward, left, up of the link in its joint's own axes.
+
+    Raises MotionError where they cannot be told, as of bones that all lie in one line.
+    """
     rest = rest_positions(recording)
-    if _is_human(rest, links):
-        return _from_rest(recording, rest, links)
-    return _Moving(recording, links).frames()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        human = _is_human(rest, links)
+        frames = _from_rest(recording, rest, links) if human else _Moving(recording, links).frames()
+    for link, frame in frames.items():
+        if not np.isfinite(frame).all():
+            joint = recording.joint_names[links[link]]
+            raise MotionError(
+                f"{recording.name}: joint {joint} ({link}): neither its bone nor the motion says "
+                f"how it is turned in the body; leave it out with --names, '{joint}: null', or "
+                "correct the file's skeleton"
+            )
+    return frames
 
 
 def _is_human(rest: np.ndarray, links: Mapping[str, int]) -> bool:
@@ -71,9 +85,8 @@ def _bone(recording: Recording, links: Mapping[str, int], link: str) -> np.ndarr
         children = [i for i, parent in enumerate(recording.parents) if parent == joint]
         inner = recording.offsets[children[0]] if len(children) == 1 else np.zeros(3)
         bone = recording.ends.get(joint, inner)
-    return (
-        bone if np.linalg.norm(bone) > 1e-3 * max(1e-9, np.abs(recording.offsets).max()) else None
-    )
+    longest = np.abs(recording.offsets[1:]).max(initial=1e-9)
+    return bone if np.linalg.norm(bone) > _NOTHING * longest else None
 
 
 class _Moving:
@@ -90,7 +103,7 @@ class _Moving:
             frames["spine_upper"] = self._chest()
         for link in (*_TRUNK, "shoulder_l", "shoulder_r"):
             if link in self.links and link not in frames:
-                base = "pelvis" if link == "spine_low" or len(frames) < 2 else "spine_upper"
+                base = "pelvis" if link == "spine_low" else self._chest_of(frames)
                 frames[link] = self._near(link, base, frames)
         for side in "lr":
             frames |= self._limb(("thigh", "shin"), side, 1.0, frames)
@@ -109,20 +122,40 @@ class _Moving:
         way = self.position[:, self.links[target]] - self.position[:, self.links[link]]
         return self._local(link, way).mean(axis=0)
 
+    def _chest_of(self, frames: Mapping[str, np.ndarray]) -> str:
+        return "spine_upper" if "spine_upper" in frames else "pelvis"
+
+    def _first(self, vectors: Iterable[np.ndarray]) -> np.ndarray:
+        """The first vector with a direction, or zeros."""
+        least = _NOTHING * np.abs(self.recording.offsets[1:]).max(initial=0.0)
+        return next((v for v in vectors if np.linalg.norm(v) > least), np.zeros(3))
+
+    def _across(self, link: str, limbs: tuple[str, ...]) -> np.ndarray:
+        """From the right to the left one of the first pair that does not start in one place."""
+        ways = (
+            self._mean_local(link, f"{limb}_l") - self._mean_local(link, f"{limb}_r")
+            for limb in limbs
+            if f"{limb}_l" in self.links and f"{limb}_r" in self.links
+        )
+        return self._first(ways)
+
     def _pelvis(self) -> np.ndarray:
         """The root's own axis that is nearest to the spine: its bone may start oblique."""
         hips = [self._mean_local("pelvis", f"thigh_{side}") for side in "lr"]
-        above = next(link for link in (*_TRUNK, "arm_l") if link in self.links)
-        up = self._mean_local("pelvis", above) - 0.5 * (hips[0] + hips[1])
+        middle = 0.5 * (hips[0] + hips[1])
+        above = (link for link in (*_TRUNK, "arm_l") if link in self.links)
+        up = self._first(self._mean_local("pelvis", link) - middle for link in above)
         axis = np.zeros(3)
         axis[np.argmax(np.abs(up))] = np.sign(up[np.argmax(np.abs(up))])
         return frame_of(up=axis, left=hips[0] - hips[1], exact="left")
 
     def _chest(self) -> np.ndarray:
-        limb = "shoulder" if "shoulder_l" in self.links else "arm"
-        left, right = (self._mean_local("spine_upper", f"{limb}_{side}") for side in "lr")
-        top = self._mean_local("spine_upper", "neck") if "neck" in self.links else left + right
-        return frame_of(up=top, left=left - right)
+        """Upright along the neck, its left where the left collar or arm is."""
+        above = [link for link in ("neck", "head") if link in self.links]
+        tops = [self._mean_local("spine_upper", link) for link in above]
+        arms = [self._mean_local("spine_upper", f"arm_{side}") for side in "lr"]
+        top = self._first([*tops, arms[0] + arms[1]])
+        return frame_of(up=top, left=self._across("spine_upper", ("shoulder", "arm", "forearm")))
 
     def _near(self, link: str, base: str, frames: Mapping[str, np.ndarray]) -> np.ndarray:
         """A trunk link: its bone points up (clavicle: aside), the rest is as `base` on average."""
@@ -142,14 +175,17 @@ class _Moving:
         """Both links of a limb, from the axis about which their joint bends."""
         upper, lower = (f"{name}_{side}" for name in pair)
         bones = [_bone(self.recording, self.links, link) for link in (upper, lower)]
-        bones = [-np.array(UP) if bone is None else bone / np.linalg.norm(bone) for bone in bones]
+        # where one has no length, both lie along one axis, as in all such skeletons
+        axis = next((bone for bone in bones if bone is not None), -UP)
+        bones = [axis if bone is None else bone for bone in bones]
+        bones = [bone / np.linalg.norm(bone) for bone in bones]
         along = [
             self.rotation[:, self.links[link]] @ bone
             for link, bone in zip((upper, lower), bones, strict=True)
         ]
         bend = sign * np.cross(along[0], along[1])
         if np.mean(bend**2) * 3 < _LEAST_BEND:  # a straight limb: as the trunk on average
-            base = "pelvis" if pair[0] == "thigh" else "spine_upper"
+            base = "pelvis" if pair[0] == "thigh" else self._chest_of(frames)
             bend = (self.rotation[:, self.links[base]] @ frames[base])[..., 1]
         both = zip((upper, lower), bones, strict=True)
         return {
@@ -160,7 +196,7 @@ class _Moving:
     def _foot(self, side: str, frames: Mapping[str, np.ndarray]) -> np.ndarray:
         """Mean over the frames in which ankle and toe are lowest: there the sole is level."""
         foot, toe = f"foot_{side}", f"toe_{side}"
-        if toe not in self.links:
+        if toe not in self.links or not self._first([self._mean_local(foot, toe)]).any():
             axis = self.rotation[:, self.links[f"shin_{side}"]] @ frames[f"shin_{side}"]
             left, up = (self._local(foot, axis[..., i]).mean(axis=0) for i in (1, 2))
             return frame_of(up=up, left=left)

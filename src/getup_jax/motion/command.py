@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,7 @@ examples:
 """
 
 _EXIT = "exit code: 0 where every file was used, with warnings or without; 1 where one was not"
+_FASTEST_HZ = 10_000
 _SOURCE = "authored, deepmimic, a folder or a file"
 
 
@@ -94,10 +96,46 @@ def _add_reading(parser: argparse.ArgumentParser) -> None:
         "one row too few is only a warning, with the flag or without",
     )
     parser.add_argument("--names", type=Path, help="YAML or JSON map {joint: link}")
-    parser.add_argument("--scale", type=float, help="metres in a unit of the file")
-    parser.add_argument("--up", choices=("y", "z"), default="y", help="vertical axis of BVH files")
-    parser.add_argument("--fps", type=float, default=30.0, help="rate of the clips")
-    parser.add_argument("--floor", type=float, help="height of the recording's floor (m)")
+    parser.add_argument("--scale", type=_above_zero, help="metres in a unit of the file")
+    parser.add_argument(
+        "--up",
+        choices=("auto", "y", "z"),
+        default="auto",
+        help="vertical axis of BVH files (default: along which their skeleton stands, else y)",
+    )
+    parser.add_argument(
+        "--source-fps",
+        type=_rate,
+        help="frames a second of BVH and AMC files, in place of what they say (AMC: 120)",
+    )
+    parser.add_argument("--fps", type=_rate, default=30.0, help="rate of the clips (default: 30)")
+    parser.add_argument("--floor", type=_finite, help="height of the recording's floor (m)")
+
+
+def _finite(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a number, got {text!r}")
+    return value
+
+
+def _above_zero(text: str) -> float:
+    value = _finite(text)
+    if not 1e-6 <= value <= 1e6:
+        raise argparse.ArgumentTypeError(f"expected a number above 0, such as 0.01, got {text!r}")
+    return value
+
+
+def _rate(text: str) -> float:
+    value = _finite(text)
+    if not 1 <= value <= _FASTEST_HZ:
+        raise argparse.ArgumentTypeError(
+            f"expected frames a second, from 1 to {_FASTEST_HZ}, got {text!r}"
+        )
+    return value
 
 
 def _import(args: argparse.Namespace, character: CharacterSpec) -> int:
@@ -170,14 +208,14 @@ def _retarget(
     character: CharacterSpec,
     done: Callable[[Path], None],
 ) -> dict[Path, Result]:
-    read = ReadOptions(up=args.up, allow_short=args.allow_short)
+    read = ReadOptions(up=args.up, allow_short=args.allow_short, fps=args.source_fps)
     settings = RetargetSettings(
         fps=args.fps,
         metres=args.scale,
         floor=args.floor,
         names=read_map(args.names) if args.names else None,
     )
-    jobs = [Job(file, character, read, settings) for file in files if file.suffix != ".npz"]
+    jobs = [Job(file, character, read, settings) for file in files if file.suffix.lower() != ".npz"]
     results = retarget_files(jobs, cpus(), done)
     found = dict(zip([job.path for job in jobs], results, strict=True))
     for file in files:

@@ -7,6 +7,7 @@ stands facing +X with its arms down.
 
 from __future__ import annotations
 
+import reprlib
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.skeleton import Recording
+from getup_jax.motion.text import LARGEST
 
 # name, parent, place in the parent (m)
 _BODIES: tuple[tuple[str, int, tuple[float, float, float]], ...] = (
@@ -33,14 +35,18 @@ _BODIES: tuple[tuple[str, int, tuple[float, float, float]], ...] = (
     ("left_shin", 12, (0.0, 0.0, -0.421546)),
     ("left_foot", 13, (0.0, 0.0, -0.40987)),
 )
+_FPS = (0.1, 10_000.0)
 _NAMES = tuple(body[0] for body in _BODIES)
 
 
 def decode(path: Path, content: dict[str, Any]) -> Recording:
     """A parsed file; MotionError names the file, the frame and the body."""
     frames, fps = content.get("frames"), content.get("fps")
-    if not isinstance(fps, int | float) or fps <= 0:
-        raise MotionError(f"{path.name}: fps: expected a number above 0, got {fps!r}")
+    if not (isinstance(fps, int | float) and fps is not True and _FPS[0] <= fps <= _FPS[1]):
+        raise MotionError(
+            f"{path.name}: fps: expected a number above 0, got {reprlib.repr(fps)}; give frames a "
+            f"second from {_FPS[0]:g} to {_FPS[1]:g}"
+        )
     if not isinstance(frames, list) or not frames:
         raise MotionError(f"{path.name}: frames: expected a list of poses, got none")
     offsets = np.array([body[2] for body in _BODIES])
@@ -73,20 +79,24 @@ def _check_bodies(where: str, frame: Any) -> None:
         raise MotionError(f"{where}: expected {{body: rotation}} with a pelvis")
     unknown = [name for name in frame if name not in _NAMES]
     if unknown:
-        raise MotionError(f"{where}: unknown bodies {unknown}; known are {', '.join(_NAMES)}")
+        raise MotionError(
+            f"{where}: unknown bodies {reprlib.repr(unknown)}; known are {', '.join(_NAMES)}"
+        )
     root = frame["pelvis"]
     if not isinstance(root, list) or len(root) != 2:
-        raise MotionError(f"{where}, pelvis: expected [[x, y, z], [quaternion]], got {root!r}")
+        got = reprlib.repr(root)
+        raise MotionError(f"{where}, pelvis: expected [[x, y, z], [quaternion]], got {got}")
 
 
 def _floats(where: str, name: str, value: Any, count: int) -> np.ndarray:
     """`count` finite numbers that are not all zero where they are a rotation."""
     try:
         numbers = np.array(value, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = np.array(np.nan)
-    if numbers.shape != (count,) or not np.isfinite(numbers).all():
-        raise MotionError(f"{where}, {name}: expected {count} finite numbers, got {value!r}")
+    if numbers.shape != (count,) or not (np.abs(numbers) <= LARGEST).all():
+        got = reprlib.repr(value)
+        raise MotionError(f"{where}, {name}: expected {count} finite numbers, got {got}")
     if count == 4 and np.linalg.norm(numbers) < 1e-6:
         raise MotionError(f"{where}, {name}: expected a rotation, got a zero quaternion")
     return numbers

@@ -7,7 +7,7 @@ in the zero pose it stands facing +X with its arms down, its right side at +Z.
 
 from __future__ import annotations
 
-import json
+import reprlib
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,11 @@ from scipy.spatial.transform import Rotation
 from getup_jax.motion.bvh import Y_UP
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.skeleton import Recording, at_times, turned
+from getup_jax.motion.text import LARGEST, read_json
 
 COLUMNS = 44
+_DURATION_S = (1e-4, 10.0)  # of a frame, but for the last
+_LEAST_NORM = 1e-6
 # name, parent, place in the parent (m), columns: 4 for a quaternion, 1 for a hinge angle
 _JOINTS: tuple[tuple[str, int, tuple[float, float, float], int], ...] = (
     ("root", -1, (0.0, 0.0, 0.0), 4),
@@ -41,12 +44,7 @@ _WRIST = (0.0, -0.258947, 0.0)
 def read_deepmimic(path: str | Path) -> Recording:
     """The motion of a DeepMimic file at the rate of its first frame."""
     path = Path(path)
-    try:
-        return decode(path, json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, UnicodeDecodeError) as error:
-        raise MotionError(f"{path}: cannot be read: {error}") from None
-    except json.JSONDecodeError as error:
-        raise MotionError(f"{path.name}, line {error.lineno}: broken JSON: {error.msg}") from None
+    return decode(path, read_json(path))
 
 
 def decode(path: Path, content: Any) -> Recording:
@@ -60,10 +58,11 @@ def decode(path: Path, content: Any) -> Recording:
             raise MotionError(f"{path.name}, frame {number}: expected {COLUMNS} values, got {got}")
     values = _numbers(path, rows)
     durations = values[:-1, 0]
-    if len(values) > 1 and (durations <= 0).any():
-        bad = int(np.argmax(durations <= 0))
+    bad = np.flatnonzero((durations < _DURATION_S[0]) | (durations > _DURATION_S[1]))
+    if len(bad):
         raise MotionError(
-            f"{path.name}, frame {bad}: expected a duration above 0 s, got {durations[bad]}"
+            f"{path.name}, frame {bad[0]}: expected a duration above 0 s, from {_DURATION_S[0]:g} "
+            f"to {_DURATION_S[1]:g} s, got {durations[bad[0]]:g}"
         )
     return _recording(path, values)
 
@@ -71,10 +70,11 @@ def decode(path: Path, content: Any) -> Recording:
 def _numbers(path: Path, rows: list[list[Any]]) -> np.ndarray:
     for number, row in enumerate(rows):
         for column, value in enumerate(row):
-            if not isinstance(value, int | float) or not np.isfinite(value):
+            real = isinstance(value, int | float) and not isinstance(value, bool)
+            if not real or not abs(value) <= LARGEST:
                 raise MotionError(
                     f"{path.name}, frame {number}, column {column}: expected a finite number, "
-                    f"got {value!r}"
+                    f"got {reprlib.repr(value)}"
                 )
     return np.array(rows, np.float64)
 
@@ -86,7 +86,14 @@ def _recording(path: Path, values: np.ndarray) -> Recording:
         part = values[:, column : column + width]
         rotations[:, joint] = part if width == 4 else _about_z(part[:, 0])
         column += width
-    rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+    length = np.linalg.norm(rotations, axis=-1, keepdims=True)
+    if length.min() < _LEAST_NORM:
+        frame, joint = np.argwhere(length[..., 0] < _LEAST_NORM)[0]
+        raise MotionError(
+            f"{path.name}, frame {frame}, joint {_JOINTS[joint][0]}: expected a rotation, got a "
+            "zero quaternion"
+        )
+    rotations /= length
     offsets = np.array([joint[2] for joint in _JOINTS])
     translations = np.tile(offsets, (frames, 1, 1))
     translations[:, 0] = values[:, 1:4]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from pathlib import Path
 
 from getup_jax.motion import asf_amc, bvh, composite_json, deepmimic
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.skeleton import Recording
+from getup_jax.motion.text import decode, read_json
 
 SUFFIXES = (".bvh", ".txt", ".json", ".amc")
 
@@ -17,8 +17,9 @@ SUFFIXES = (".bvh", ".txt", ".json", ".amc")
 class ReadOptions:
     """What files do not say about themselves."""
 
-    up: str = "y"  # y | z: the vertical axis of BVH files
+    up: str = "auto"  # y | z: the vertical axis of BVH files; auto: as their skeleton shows
     allow_short: bool = False  # take BVH files that lack more than one row, or have too many
+    fps: float | None = None  # rate of BVH and AMC files, in place of what they say or leave out
 
 
 def read_motion(path: str | Path, options: ReadOptions = ReadOptions()) -> Recording:
@@ -28,9 +29,10 @@ def read_motion(path: str | Path, options: ReadOptions = ReadOptions()) -> Recor
     if not path.is_file():
         raise MotionError(f"{path}: no such file")
     if suffix == ".bvh":
-        return bvh.read_bvh(path, bvh.BvhOptions(up=options.up, allow_short=options.allow_short))
+        how = bvh.BvhOptions(up=options.up, allow_short=options.allow_short, fps=options.fps)
+        return bvh.read_bvh(path, how)
     if suffix == ".amc":
-        return asf_amc.read_amc(path)
+        return asf_amc.read_amc(path, options.fps or asf_amc.CMU_FPS)
     if suffix in (".txt", ".json"):
         return _read_json(path)
     raise MotionError(f"{path.name}: unknown format {suffix!r}; known are {', '.join(SUFFIXES)}")
@@ -39,16 +41,11 @@ def read_motion(path: str | Path, options: ReadOptions = ReadOptions()) -> Recor
 def motion_files(folder: Path) -> list[Path]:
     """The motion files below a folder, sorted; those that only look alike are left out."""
     found = [file for file in folder.rglob("*") if file.suffix.lower() in (*SUFFIXES, ".npz")]
-    return sorted(file for file in found if not _is_other_text(file))
+    return sorted(file for file in found if file.is_file() and not _is_other_text(file))
 
 
 def _read_json(path: Path) -> Recording:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        raise MotionError(f"{path.name}: expected a text file, got binary data") from None
-    except json.JSONDecodeError as error:
-        raise MotionError(f"{path.name}, line {error.lineno}: broken JSON: {error.msg}") from None
+    content = read_json(path)
     if isinstance(content, dict) and "Frames" in content:
         return deepmimic.decode(path, content)
     if isinstance(content, dict) and "frames" in content:
@@ -62,5 +59,8 @@ def _is_other_text(file: Path) -> bool:
     """A .txt or .json without the word `frames` near its start is no motion."""
     if file.suffix.lower() not in (".txt", ".json"):
         return False
-    with file.open("rb") as stream:
-        return b"frames" not in stream.read(4096).lower()
+    try:
+        with file.open("rb") as stream:
+            return "frames" not in decode(stream.read(4096)).lower()
+    except OSError:
+        return False  # its reader says why

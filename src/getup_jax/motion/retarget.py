@@ -8,23 +8,24 @@ What is left of the floor's penetration is lifted away.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from getup_jax.motion.body import Body, body_of, hull_heights
+from getup_jax.motion.bones import guess_unit, require_body
 from getup_jax.motion.branches import BranchSettings, nearer_branches
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.names import map_names, require_links, unknown_joints
+from getup_jax.motion.identify import identify
+from getup_jax.motion.names import unknown_joints
 from getup_jax.motion.skeleton import (
     Recording,
     check_finite,
     cut,
     forward,
     resampled,
-    rest_positions,
     scaled,
     without_first,
 )
@@ -32,9 +33,9 @@ from getup_jax.motion.solver import SolverSettings, solve_clip
 from getup_jax.motion.targets import Targets, make_targets
 from getup_jax.physics.character import CharacterSpec
 
-# Units that motion files come in: m, cm, inch, mm, and CMU's (inches times 0.45).
-_UNITS_M = (1.0, 0.01, 0.0254, 0.001, 0.0254 / 0.45)
-_LEG_M = 0.83  # thigh and shin of an adult
+_MEAN_ERROR_M, _LINK_ERROR_M = 0.05, 0.1  # of all links and of one: more is not this motion
+_MOST_FRAMES = 300_000  # of a clip
+_SHOWN = 6  # links in a warning
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,19 +74,18 @@ def retarget(
 ) -> tuple[Clip, RetargetReport]:
     """The recording's motion on the character, and how well it fits.
 
-    Raises MotionError where joints that are needed have no known name.
+    Raises MotionError where joints that are needed have no known name or no bone.
     """
-    names, parents = recording.joint_names, recording.parents
-    links = map_names(names, parents, settings.names)
-    require_links(recording.name, names, links)
-    recording = prepare(check_finite(recording), links, settings)
+    recording, links = identify(recording, settings.names)
+    recording = require_body(check_finite(recording), links)
+    recording = prepare(recording, links, settings)
     body = body_of(character)
     targets = make_targets(recording, links, body, settings.floor)
     qpos = solve_clip(body, targets, settings.solver)
     qpos = nearer_branches(qpos, character, settings.fps, settings.branches)
     qpos[:, 2] += lift(_hull_minimum(qpos, body), settings)
     clip = Clip(recording.name, settings.fps, qpos, recording.source)
-    unknown = tuple(unknown_joints(names, links))
+    unknown = tuple(unknown_joints(recording.joint_names, links))
     return clip, _report(clip, body, targets, unknown, recording.warnings)
 
 
@@ -95,20 +95,19 @@ def prepare(
     """In metres, without a leading T-pose, at the clip's rate."""
     if not recording.num_frames:
         raise MotionError(f"{recording.name}: expected at least one frame, got none")
+    frames = recording.num_frames / recording.fps * settings.fps
+    if frames > _MOST_FRAMES:
+        raise MotionError(
+            f"{recording.name}: {recording.num_frames:,} frames at {recording.fps:g} a second are "
+            f"{frames:,.0f} at {settings.fps:g}, expected at most {_MOST_FRAMES:,}; cut the file, "
+            "or give its rate with --source-fps"
+        )
     recording = scaled(recording, settings.metres or guess_unit(recording, links))
     if starts_in_t_pose(recording, links):
         recording = without_first(recording).warn(
             "first row is a T-pose: dropped (the second stands in, so frame numbers stay)"
         )
     return resampled(recording, settings.fps)
-
-
-def guess_unit(recording: Recording, links: Mapping[str, int]) -> float:
-    """The size in metres of the recording's unit, for which its legs are an adult's."""
-    rest = rest_positions(recording)
-    points = [rest[links[f"{name}_l"]] for name in ("thigh", "shin", "foot")]
-    leg = np.linalg.norm(np.diff(points, axis=0), axis=-1).sum()
-    return min(_UNITS_M, key=lambda unit: abs(np.log(max(leg, 1e-9) * unit / _LEG_M)))
 
 
 def starts_in_t_pose(recording: Recording, links: Mapping[str, int]) -> bool:
@@ -165,6 +164,7 @@ def _report(
     position, rotation = _poses(clip.qpos, body)
     known = sorted(targets.names)
     error = np.linalg.norm((position - targets.position)[:, known], axis=-1)
+    warnings += _large_errors(error.mean(axis=0), [targets.names[link] for link in known])
     hinges, character = clip.qpos[:, 7:], body.character
     at_limit = (hinges <= character.joint_lower + 1e-6) | (hinges >= character.joint_upper - 1e-6)
     jumps = np.abs(np.diff(hinges, axis=0)).max(axis=0) if len(hinges) > 1 else np.zeros(1)
@@ -179,4 +179,17 @@ def _report(
         jump_joint=character.joint_names[int(jumps.argmax())],
         unknown_joints=unknown,
         warnings=warnings,
+    )
+
+
+def _large_errors(mean: np.ndarray, names: Sequence[str]) -> tuple[str, ...]:
+    """A warning where the clip is not the recording's motion; `mean` [L] (m) is of each link."""
+    if mean.mean() <= _MEAN_ERROR_M and mean.max() <= _LINK_ERROR_M:
+        return ()
+    worst = [k for k in np.argsort(-mean) if mean[k] > _MEAN_ERROR_M][:_SHOWN]
+    links = ", ".join(f"{names[k]} {100 * mean[k]:.0f} cm" for k in worst)
+    return (
+        f"mean error {100 * mean.mean():.1f} cm, at most {100 * _MEAN_ERROR_M:.0f} cm are usual: "
+        f"the clip is another motion than the file's at {links}; check the lengths of the file's "
+        "bones, --names and --up",
     )

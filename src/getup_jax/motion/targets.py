@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from getup_jax.motion.body import Body, hull_heights
+from getup_jax.motion.bones import bone_length, leg_lengths
 from getup_jax.motion.calibrate import anatomical_frames
 from getup_jax.motion.skeleton import Recording, forward, rest_positions
 
@@ -82,17 +83,16 @@ class _Maker:
             for link, joint in links.items()
             if link in body.links
         }
-        self.scale = self._ratio(("thigh", "shin", "foot"))
+        self.scale = self._ratio()
         self.chest = next(n for n in ("spine_upper", "spine_mid", "pelvis") if n in self.rotations)
 
-    def _ratio(self, limb: tuple[str, str, str]) -> float:
-        """The character's length of a limb over the recording's."""
-
-        def length(rest: np.ndarray, at: Mapping[str, int]) -> float:
-            points = [[rest[at[f"{name}_{side}"]] for name in limb] for side in "lr"]
-            return float(np.linalg.norm(np.diff(points, axis=1), axis=-1).sum())
-
-        return length(self.body.rest, self.body.links) / length(self.rest, self.links)
+    def _ratio(self) -> float:
+        """The character's length of the legs over the recording's, of bones that have a length."""
+        ours, theirs = (
+            np.stack([leg_lengths(rest, at, side) for side in "lr"])
+            for rest, at in ((self.body.rest, self.body.links), (self.rest, self.links))
+        )
+        return float(ours[theirs > 0].sum() / theirs.sum())
 
     def positions(self) -> dict[str, np.ndarray]:
         """{link: [F, 3]} for every link that both sides have."""
@@ -112,7 +112,9 @@ class _Maker:
             place[arm] = self._rigid(place, arm, *above)
         for link in self._both(tuple(_BONES)):
             parent = _BONES[link]
-            if parent in place:
+            if parent in place and not bone_length(self.rest, self.links, parent, link):
+                place[link] = self._rigid(place, link, parent, parent)
+            elif parent in place:
                 way = self._source(link) - self._source(parent)
                 length = np.linalg.norm(way, axis=-1, keepdims=True)
                 place[link] = place[parent] + way / np.maximum(length, 1e-9) * self._length(link)
