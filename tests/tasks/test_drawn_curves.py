@@ -276,7 +276,10 @@ def test_an_episode_that_starts_anew_gets_a_curve_of_its_own(character):
         ({"drawn_share": 1.5}, r"task\.drawn_share: expected a number from 0 to 1, got 1\.5"),
         ({"curve_noise": -1.0}, r"task\.curve_noise: expected a number from 0 to 10, got -1\.0"),
         ({"duration_range": (1.3, 0.7)}, r"task\.duration_range: .* the smaller one first"),
-        ({"duration_range": (0.0, 1.0)}, r"task\.duration_range\[0\]: expected a number more than 0"),
+        (
+            {"duration_range": (0.0, 1.0)},
+            r"task\.duration_range\[0\]: expected a number more than 0",
+        ),
     ],
 )
 def test_mistakes_of_the_settings(settings, message):
