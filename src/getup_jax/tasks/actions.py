@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from getup_jax.config import TaskConfig
 from getup_jax.nets import prior as pose_prior
 from getup_jax.nets.prior import PosePrior
 
@@ -43,6 +44,8 @@ class Units:
     def action(self, pose: jax.Array, target: jax.Array, condition: jax.Array) -> jax.Array:
         """The action [..., A] with that target [..., J], its latent being the one of `pose`."""
         latent = self.latent(pose, condition)
+        if self.offset_scale == 0:  # offsets do nothing
+            return jnp.concatenate([latent, jnp.zeros_like(target)], axis=-1)
         rest = target - self.pose(latent, condition)
         return jnp.concatenate([latent, rest / self.offset_scale], axis=-1)
 
@@ -55,6 +58,35 @@ class Units:
             return self.action(angles, angles, condition)
         latent = self.latent(angles, condition)
         return jnp.concatenate([latent, jnp.zeros_like(angles)], axis=-1)
+
+    def first(
+        self, config: TaskConfig, flat: bool, angles: jax.Array, condition: jax.Array
+    ) -> jax.Array:
+        """The action [..., A] that a start's filter holds, for its pose angles [..., J].
+
+        The prior knows no feet turned to a slope, nor limp bodies: without offsets, the servos
+        would push the former over and throw the latter about. With all of them the reward of limp
+        bodies would be 0 at first, see `rewards.natural`.
+        """
+        if config.limp_share > 0:
+            return self.hold(angles, condition, config.offset_limit_rad)
+        if flat:
+            return self.nearest(angles, condition)
+        return self.action(angles, angles, condition)
+
+    def hold(self, angles: jax.Array, condition: jax.Array, most_rad: float) -> jax.Array:
+        """The action [..., A] whose target is the pose angles [..., J], or near it.
+
+        By latent pose and offsets. With a prior, these are scaled down where their sum |dq|_1 would
+        exceed most_rad.
+        """
+        exact = self.action(angles, angles, condition)
+        if self.prior is None:
+            return exact
+        latent, offset = exact[..., : self.latent_size], exact[..., self.latent_size :]
+        total = self.offset_scale * jnp.abs(offset).sum(axis=-1, keepdims=True)
+        share = most_rad / jnp.maximum(total, most_rad)
+        return jnp.concatenate([latent, share * offset], axis=-1)
 
     def latent(self, angles: jax.Array, condition: jax.Array) -> jax.Array:
         """The latent parts [..., Z] that the prior encodes poses [..., J] by."""

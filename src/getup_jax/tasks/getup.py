@@ -171,12 +171,9 @@ class GetUpTask:
             misfit=None if world.pool.misfit is None else world.pool.misfit[index],
         )
         # The filter keeps most of the last action, so the first target must be the start pose.
-        angles = physics.kinematics.qpos[:, 7:]
-        condition, units = self.targets(state)[:, 0], self.units(world)
-        if self.terrain is None:
-            hold = units.nearest(angles, condition)
-        else:  # the prior knows no feet turned to a slope: without offsets, they would push it over
-            hold = units.action(angles, angles, condition)
+        angles, condition = physics.kinematics.qpos[:, 7:], self.targets(state)[:, 0]
+        flat = self.terrain is None
+        hold = self.units(world).first(self.config, flat, angles, condition)
         if world.pool.action is not None:
             given = world.pool.action[index]
             hold = jnp.where(jnp.isnan(given), hold, given)
