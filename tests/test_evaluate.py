@@ -37,6 +37,7 @@ def results(run_folder):
     """What `getup-eval` wrote about the run, and what it printed is in its log."""
     file = run_folder / "out.json"
     options = ["--episodes", "3", "--start-noise", "0.05", "--duration-scale", "0.8,1.2"]
+    options += ["--edits", "2"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(evaluate, "build_task", build)
         command = ["--ckpt", str(run_folder), *options, "--stand-time", "1", "--json", str(file)]
@@ -52,6 +53,7 @@ def test_eval_writes_scores_policy_and_conditions(results):
     assert found["policy"]["steps"] == 300
     conditions = found["conditions"]
     assert (conditions["start_noise_rad"], conditions["duration_scale"]) == (0.05, [0.8, 1.2])
+    assert conditions["edits"] == 2
     assert (conditions["stand_time_s"], conditions["engine"]) == (1.0, "native")
     assert (conditions["drops"], conditions["drop"]) == (None, None)
     assert found["rules"] == {
@@ -61,6 +63,21 @@ def test_eval_writes_scores_policy_and_conditions(results):
     assert 0.0 <= found["saturation"] <= 1.0
     assert found["offset_rad"] > 0
     assert found["foot_slip_m_s"] > 0
+
+
+def test_eval_writes_how_much_of_its_edits_was_done(results):
+    found = json.loads(results.read_text())
+    assert set(found["control_gain"]) == {"height", "side_angle", "front_angle"}
+    for row in found["control_gain"].values():
+        assert -2.0 < row["gain"] < 2.0
+        assert -1.0 <= row["correlation"] <= 1.0
+    assert 0.02 < found["control_gain"]["height"]["asked_rms"] < 0.08
+    assert found["success_edits"] == 0.0
+
+
+def test_edits_of_a_standing_start_are_refused(run_folder, capsys):
+    assert cli.eval_main(["--ckpt", str(run_folder), "--edits", "2", "--start", "standing"]) == 2
+    assert capsys.readouterr().err.startswith("ConfigError: --edits: are of the rise")
 
 
 def test_the_config_of_an_evaluation_takes_its_starts_from_the_arguments():

@@ -24,6 +24,7 @@ LAYERS = [
     ["footing", "transfer", "rehearsal"],
     ["loop", "train"],
     ["conditions", "naturalness", "episodes", "scores", "score_table", "video", "eval_plot"],
+    ["control_gain"],
     ["composite"],
     ["composite_card"],
     ["evaluate", "model_card", "export", "search"],

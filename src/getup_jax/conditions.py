@@ -39,6 +39,7 @@ class Conditions:
     duration_scale: tuple[float, float] = (1.0, 1.0)  # each episode's T is multiplied by U(a, b)
     blend: str | None = None  # half | random: mixtures of two curves; None: the curves themselves
     push_ns: float | None = None  # impulse to the chest while standing
+    edits: int = 0  # variants of each curve, run beside the episodes for the control gain
     seed: int = 0
     curves: tuple[str, ...] = ()  # curve files in place of the trained styles
     motions: str | None = None  # a config whose motions are there in place of the trained styles
@@ -55,6 +56,7 @@ class Conditions:
             duration_scale=args.duration_scale,
             blend=args.blend,
             push_ns=args.push,
+            edits=args.edits or 0,
             seed=args.seed,
             curves=tuple(map(str, args.curves or ())),
             motions=None if args.motions is None else str(args.motions),
@@ -70,6 +72,8 @@ class Conditions:
         """Raise ConfigError for what cannot be evaluated under the config."""
         if self.drops is not None and self.kind == STANDING:
             raise ConfigError("--drops: says how bodies lie, but --start standing has none that do")
+        if self.edits and self.kind == STANDING:
+            raise ConfigError("--edits: are of the rise, so expected --start lying, got standing")
         stand_s = config.task.stand_time_s
         if self.push_ns is not None and stand_s <= PUSH_AFTER_S:
             raise ConfigError(

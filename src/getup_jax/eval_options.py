@@ -17,6 +17,7 @@ examples:
                                                        other start poses, faster and slower
   getup-eval --blend --push 20                         curves never seen, and pushes
   getup-eval --ckpt terrain --drops paper              bodies dropped as the papers do
+  getup-eval --edits 8                                 how well it obeys changes of its curves
   getup-eval --curves my_rise.yaml                     a style from getup-edit
   getup-eval --motions configs/flat_lafan1.yaml        recorded get-ups that it has never seen
 
@@ -121,6 +122,12 @@ def _add_conditions(group: argparse._ArgumentGroup) -> None:
         const="half",
         help="follow mixtures of two curves that start alike: half and half, or with a random "
         "weight for every pair",
+    )
+    add(
+        "--edits",
+        type=positive,
+        metavar="N",
+        help="also N small random edits of each curve: how much of what they ask for is done",
     )
     add(
         "--push",

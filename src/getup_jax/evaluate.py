@@ -14,7 +14,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from getup_jax import checkpoint, eval_plot, video
+from getup_jax import checkpoint, control_gain, eval_plot, video
 from getup_jax.algo.learner import Learner, make_learner
 from getup_jax.algo.state import PolicyState
 from getup_jax.checkpoint import LoadedPolicy
@@ -29,6 +29,7 @@ from getup_jax.conditions import (
     of_config,
 )
 from getup_jax.config import Config, ConfigError, TaskConfig, TerrainConfig
+from getup_jax.control_gain import ControlGain
 from getup_jax.episodes import Episodes, run_episodes
 from getup_jax.grounds import Places
 from getup_jax.motion.clips import GetUp
@@ -70,10 +71,18 @@ def evaluate_command(args: argparse.Namespace) -> int:
     with Display(number, unit="episodes") as display:
         display.log(f"{loaded.path}: {loaded.metadata.get('steps', 0):,} steps of training")
         episodes, scores = evaluate(config, loaded, conditions, number, display)
+    control = None
+    if conditions.edits:
+        control = evaluate_edits(config, loaded, episodes.task, conditions)
     print(table(scores))
+    if control is not None:
+        print(control_gain.table({args.ckpt: control}))
     print(f"{number} episodes in {time.monotonic() - begin:.0f} s")
     if args.json is not None:
         facts = description(config, loaded, conditions, episodes)
+        if control is not None:
+            facts["control_gain"] = control_gain.to_json(control)
+            facts["success_edits"] = control.success
         args.json.write_text(json.dumps({**to_json(scores), **facts}, indent=2) + "\n")
     _write_pictures(args.video, args.plot, episodes)
     return 0
@@ -84,14 +93,14 @@ def evaluate(
 ) -> tuple[Episodes, Scores]:
     """Run and score the episodes; `config` is that of `evaluation_config`."""
     prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
-    task = build_task(config, display.log, prior, _styles(config, conditions))
+    task = build_task(config, display.log, prior, chosen_styles(config, conditions))
     learner, policy = restore_policy(config, loaded, task)
     *_, num_styles, rows = task.world.pool.table.shape
     plan = make_plan(conditions, number, num_styles, rows)
     if task.world.pool.startable is not None:
         plan = plan.on_regions(task.world.pool)
     display.log("compiling the episode ...")
-    episodes = run_episodes(task, learner, policy, plan, _Rate(display, number))
+    episodes = run_episodes(task, learner, policy, plan, Rate(display, number))
     control_dt = task.environment.engine.control_dt
     scores = score(
         episodes.trace,
@@ -113,6 +122,18 @@ def _places(config: Config, task: BuiltTask, plan: Plan) -> Places | None:
     index = np.asarray(pool.table)[plan.kind, plan.region, plan.getup, plan.row]
     xy = np.asarray(pool.physics.kinematics.qpos)[index, :2]
     return Places.of(plan.region, xy, config.terrain)
+
+
+def evaluate_edits(
+    config: Config, loaded: LoadedPolicy, task: BuiltTask, conditions: Conditions
+) -> ControlGain:
+    """How well the policy obeys edits of the task's curves; see `control_gain.py`."""
+    learner, policy = restore_policy(config, loaded, task)
+    plan = control_gain.edit_plan(task, conditions.edits, conditions.seed)
+    number = len(plan.getup)
+    with Display(number, unit="episodes") as display:
+        display.log(f"{conditions.edits} edits of each curve ...")
+        return control_gain.measure(task, learner, policy, plan, Rate(display, number))
 
 
 def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
@@ -199,7 +220,7 @@ def _drop(task: TaskConfig) -> dict[str, Any]:
     return {**dataclasses.asdict(DROPS[task.drop_as]), "fallen_share": task.fallen_share}
 
 
-class _Rate:
+class Rate:
     """Shows episodes done, their rate and the time left; the first call, a compile, sets zero."""
 
     _PARTS = 20  # a terminal's bar moves, and elsewhere a line comes, this often
@@ -210,6 +231,7 @@ class _Rate:
         self._shown = 0
 
     def __call__(self, done: float) -> None:
+        """Show that so many episodes are done."""
         now = time.monotonic()
         if self._first is None:
             self._first = (done, now)
@@ -221,7 +243,7 @@ class _Rate:
             self._shown = part
 
 
-def _styles(config: Config, conditions: Conditions) -> Choice | None:
+def chosen_styles(config: Config, conditions: Conditions) -> Choice | None:
     """What makes the styles out of those of the training; None: they are the same."""
     if conditions.curves:
         files = [read_curve_file(path) for path in conditions.curves]

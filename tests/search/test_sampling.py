@@ -26,7 +26,7 @@ def test_distance_sees_height_and_pose():
 def test_no_parent_has_more_than_its_share_of_children_that_go_on():
     sampler = Sampler(env=None, size=8, children=64)  # type: ignore[arg-type]
     score = jnp.arange(64.0).reshape(8, 8).T.reshape(-1)  # the children of parent 0 are best
-    chosen = np.asarray(sampler._fittest(score))
+    chosen = np.asarray(sampler.fittest(score))
     parents = chosen % 8
     assert np.bincount(parents, minlength=8).max() == MOST_CHILDREN
     np.testing.assert_array_equal(parents, np.repeat([0, 1], MOST_CHILDREN))
@@ -34,7 +34,7 @@ def test_no_parent_has_more_than_its_share_of_children_that_go_on():
 
 def test_one_child_of_every_parent_does_not_change(built):
     sampler = Sampler(built.environment, size=4, children=16)
-    noise = np.asarray(sampler._noise(0.3, jax.random.PRNGKey(0)))
+    noise = np.asarray(sampler.noise(0.3, jax.random.PRNGKey(0)))
     assert (noise[:4] == 0.0).all()
     assert (np.abs(noise[4:]).max(axis=1) > 0.0).all()
 

@@ -158,6 +158,7 @@ def _refuse_getup_options(args: argparse.Namespace) -> None:
         "--blend": args.blend is not None,
         "--push": args.push is not None,
         "--drops": args.drops is not None,
+        "--edits": args.edits is not None,
         "--start standing": args.start == "standing",
         "--terrain-seed": args.terrain_seed is not None,
     }

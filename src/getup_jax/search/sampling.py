@@ -83,7 +83,7 @@ class Sampler:
         parent = jnp.arange(self.children) % self.size
         state = take(population.state, parent)
         before = state.action - reference.action[0]
-        change = _PERSISTENCE * before + self._noise(settings.spread_rad, key)
+        change = _PERSISTENCE * before + self.noise(settings.spread_rad, key)
 
         def step(
             carry: tuple[EpisodeState, jax.Array], x: tuple[Reference, jax.Array]
@@ -100,13 +100,13 @@ class Sampler:
         begin = (state, jnp.zeros(self.children))
         (state, total), (cost, reward) = jax.lax.scan(step, begin, (steps, shares))
         score = settings.memory * population.score[parent] + total / count + cost[-1]
-        chosen = self._fittest(score)
+        chosen = self.fittest(score)
         return (
             Population(take(state, chosen), score[chosen]),
             Window(parent=parent[chosen], task_reward=reward[-1, chosen]),
         )
 
-    def _noise(self, spread: jax.Array | float, key: jax.Array) -> jax.Array:
+    def noise(self, spread: jax.Array | float, key: jax.Array) -> jax.Array:
         """Changes [B, A] of the filtered action, from none (one child of each parent) to wild."""
         key_value, key_size, key_which = jax.random.split(key, 3)
         shape = (self.children, self.env.action_size)
@@ -139,7 +139,7 @@ class Sampler:
         apart = distance(links, jnp.broadcast_to(now.links, links.shape)) / _POSE_SCALE_M
         return jnp.where(kinematics.finite, gap.sum(axis=-1) + pose * now.trust * apart, _FAILED)
 
-    def _fittest(self, score: jax.Array) -> jax.Array:
+    def fittest(self, score: jax.Array) -> jax.Array:
         """Numbers [K] of the children that go on."""
         siblings = score.reshape(-1, self.size)
         rank = jnp.argsort(jnp.argsort(siblings, axis=0), axis=0).reshape(-1)

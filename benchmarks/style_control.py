@@ -1,0 +1,105 @@
+"""How well a policy obeys edits of its curves, and how well a search around it does.
+
+    python benchmarks/style_control.py [POLICY] [--curves FILE ...] [--only STYLE ...] [--edits 8]
+        [--bound N] [--seed 0] [--json FILE]
+
+POLICY: a run folder, a checkpoint or the name of a shipped policy (default: flat). Each of its
+styles, or those of curve files, is followed as it is and with random edits of its inner control
+points; what control_gain.py says about the measure holds. --bound N also measures a search
+(search/follow.py) on N edits of each style, which takes one to two minutes an episode on two cores:
+choose few styles with --only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from getup_jax import checkpoint, control_gain
+from getup_jax.conditions import Conditions
+from getup_jax.config import ConfigError
+from getup_jax.control_gain import ControlGain, edit_plan, measure
+from getup_jax.eval_options import eval_parser, natural, output, positive
+from getup_jax.evaluate import Choice, Rate, chosen_styles, evaluation_config, restore_policy
+from getup_jax.motion.clips import GetUp
+from getup_jax.nets import prior as pose_prior
+from getup_jax.physics.character import CharacterSpec
+from getup_jax.progress import Display
+from getup_jax.search.follow import bound
+from getup_jax.tasks.build import build_task
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("policy", nargs="?", default="flat", metavar="POLICY")
+    parser.add_argument("--curves", nargs="+", default=[], metavar="FILE")
+    parser.add_argument("--only", nargs="+", default=[], metavar="STYLE")
+    parser.add_argument("--edits", type=positive, default=8, metavar="N")
+    parser.add_argument("--bound", type=positive, metavar="N")
+    parser.add_argument("--seed", type=natural, default=0, metavar="S")
+    parser.add_argument("--json", type=output(".json"), metavar="FILE")
+    args = parser.parse_args()
+    try:
+        results = run(args)
+    except ValueError as error:  # of the user's making: a setting, a curve, a checkpoint
+        raise SystemExit(f"{type(error).__name__}: {error}") from None
+    print(control_gain.table(results))
+    if args.json is not None:
+        write(args.json, results)
+
+
+def run(args: argparse.Namespace) -> dict[str, ControlGain]:
+    """The measure of the policy and, where it is asked for, of the search."""
+    given = ["--ckpt", args.policy, "--seed", str(args.seed)]
+    options = eval_parser().parse_args(given + (["--curves", *args.curves] if args.curves else []))
+    loaded = checkpoint.load_policy(args.policy)
+    config = evaluation_config(loaded.config, options)
+    choose = functools.partial(only, args.only, chosen_styles(config, Conditions.of(options)))
+    prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
+    task = build_task(config, print, prior, choose)
+    learner, policy = restore_policy(config, loaded, task)
+    results = {}
+    for name, how, edits in ((args.policy, measure, args.edits), ("search", bound, args.bound)):
+        if edits is not None:
+            plan = edit_plan(task, edits, args.seed)
+            with Display(len(plan.getup), unit="episodes") as display:
+                rate = Rate(display, len(plan.getup))
+                results[name] = how(task, learner, policy, plan, rate)
+    return results
+
+
+def only(
+    names: Sequence[str],
+    choose: Choice | None,
+    getups: tuple[GetUp, ...],
+    character: CharacterSpec,
+) -> tuple[GetUp, ...]:
+    """The styles of those names; all of them where none is named."""
+    found = getups if choose is None else choose(getups, character)
+    known = [getup.name for getup in found]
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise ConfigError(f"--only: expected styles of {', '.join(known)}, got {unknown[0]!r}")
+    return tuple(getup for getup in found if not names or getup.name in names)
+
+
+def write(file: Path, results: dict[str, ControlGain]) -> None:
+    """{name: {control_gain, edits, curves}}."""
+    plain = {
+        name: {
+            "control_gain": control_gain.to_json(result),
+            "edits": result.edits,
+            "curves": result.curves,
+        }
+        for name, result in results.items()
+    }
+    file.write_text(json.dumps(plain, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
