@@ -147,7 +147,7 @@ def test_eval_passes_its_arguments_on(monkeypatch):
     default |= dict.fromkeys(
         ["json", "video", "plot", "engine", "stand_time", "blend", "push", "edits", "curves"]
     )
-    default |= {"terrain_seed": None, "motions": None, "script": None}
+    default |= {"terrain_seed": None, "motions": None, "script": None, "drops": None}
     assert vars(seen[0]) == default
     assert vars(seen[1]) == default | {
         "ckpt": "runs/a",

@@ -185,9 +185,9 @@ def test_results_of_another_policy_are_refused(run_folder, results, tmp_path, ca
     other["policy"]["steps"] = 1
     file = tmp_path / "other.json"
     file.write_text(json.dumps(other))
-    assert export.main([str(run_folder), str(tmp_path / "out"), "--eval", str(file)]) == 2
+    assert cli.export_main([str(run_folder), str(tmp_path / "out"), "--eval", str(file)]) == 2
     assert "evaluate what is exported" in capsys.readouterr().err
     file.write_text("{}")
-    assert export.main([str(run_folder), str(tmp_path / "out"), "--eval", str(file)]) == 2
+    assert cli.export_main([str(run_folder), str(tmp_path / "out"), "--eval", str(file)]) == 2
     assert "expected a file of getup-eval --json" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -19,6 +19,7 @@ LAYERS = [
     ["storage", "manifest", "checkpoint", "metrics", "progress", "journal", "runfolder", "stop"],
     ["physics", "nets", "motion"],
     ["tasks"],
+    ["grounds"],
     ["algo"],
     ["lessons"],
     ["footing", "transfer", "rehearsal"],

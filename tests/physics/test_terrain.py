@@ -191,7 +191,7 @@ def test_a_spawn_outside_the_regions_is_an_error(ground):
         ),
         ({"tile_m": float("nan")}, r"terrain\.tile_m: expected .*, got nan"),
         ({"curriculum": "fast"}, r"terrain\.curriculum: expected one of"),
-        ({"drops": 0}, r"terrain\.drops: expected a whole number from 1 to 1000000, got 0"),
+        ({"drops": 0}, r"terrain\.drops: expected a whole number from 1 to 200000, got 0"),
     ],
 )
 def test_a_ground_that_cannot_be_built_is_an_error(changes, text):

@@ -26,7 +26,7 @@ class TaskConfig:
     # ... or with the head on the floor, for this long
     terminate_after_s: float = number(0.3, least=0, most=3600)
     # the head is on the floor below this gap
-    head_clearance_m: float = number(0.02, least=0, most=1)
+    head_clearance_m: float = number(0.02, least=0, most=10)
     # while training: for this long a head that is on the floor for too long only costs the reward;
     # limp bodies that came to rest face down must learn to raise it
     head_grace_s: float = number(0.0, least=0, most=3600)
