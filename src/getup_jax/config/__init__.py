@@ -1,7 +1,9 @@
 """Every setting, its default and its meaning; YAML files hold only differences.
 
-Sub-configs that are None are switched off, and the switch is decided when the step is
-traced. `load_config` is in `settings.py`.
+Every number has its range beside its default (`ranges.number`), and all are checked before
+anything is built; relations between settings are in `__post_init__`. Sub-configs that are None
+are switched off, and the switch is decided when the step is traced. `load_config` is in
+`settings.py`.
 """
 
 from __future__ import annotations
