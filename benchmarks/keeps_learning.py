@@ -30,8 +30,10 @@ from getup_jax.scores import episode_values
 from getup_jax.settings import load_config
 from getup_jax.train import run
 
-# no help, and the noise of a run's end
+# the networks of the shipped policies, no help, and the noise of a run's end
 _GETUP = (
+    "network.mirror=false",
+    "prior.mirror=false",
     "task.assist=0",
     "task.clip_start=0.2",
     "task.focus=0",
@@ -68,7 +70,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, help="of an evaluation (default: 64 to 400)")
     parser.add_argument("--run", type=Path, default=Path("runs/keeps_learning"), metavar="FOLDER")
     parser.add_argument("--json", type=Path, metavar="FILE")
-    args = parser.parse_args()
+    args = parser.parse_intermixed_args()
     settings = [word for word in args.words if "=" in word]
     names = [word for word in args.words if "=" not in word] or list(CASES)
     unknown = [name for name in names if name not in CASES]
