@@ -13,7 +13,6 @@ choose few styles with --only.
 from __future__ import annotations
 
 import argparse
-import functools
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,10 +22,9 @@ from getup_jax.conditions import Conditions
 from getup_jax.config import ConfigError
 from getup_jax.control_gain import ControlGain, edit_plan, measure
 from getup_jax.eval_options import eval_parser, natural, output, positive
-from getup_jax.evaluate import Choice, Rate, chosen_styles, evaluation_config, restore_policy
+from getup_jax.evaluate import Rate, chosen_styles, evaluation_config, restore_policy
 from getup_jax.motion.clips import GetUp
 from getup_jax.nets import prior as pose_prior
-from getup_jax.physics.character import CharacterSpec
 from getup_jax.progress import Display
 from getup_jax.search.follow import bound
 from getup_jax.tasks.build import build_task
@@ -59,33 +57,28 @@ def run(args: argparse.Namespace) -> dict[str, ControlGain]:
     options = eval_parser().parse_args(given + (["--curves", *args.curves] if args.curves else []))
     loaded = checkpoint.load_policy(args.policy)
     config = evaluation_config(loaded.config, options)
-    choose = functools.partial(only, args.only, chosen_styles(config, Conditions.of(options)))
+    choose = chosen_styles(config, Conditions.of(options))
     prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
     task = build_task(config, print, prior, choose)
     learner, policy = restore_policy(config, loaded, task)
+    styles = numbers(args.only, task.getups)
     results = {}
     for name, how, edits in ((args.policy, measure, args.edits), ("search", bound, args.bound)):
         if edits is not None:
-            plan = edit_plan(task, edits, args.seed)
+            plan = edit_plan(task, edits, args.seed, styles)
             with Display(len(plan.getup), unit="episodes") as display:
                 rate = Rate(display, len(plan.getup))
                 results[name] = how(task, learner, policy, plan, rate)
     return results
 
 
-def only(
-    names: Sequence[str],
-    choose: Choice | None,
-    getups: tuple[GetUp, ...],
-    character: CharacterSpec,
-) -> tuple[GetUp, ...]:
-    """The styles of those names; all of them where none is named."""
-    found = getups if choose is None else choose(getups, character)
-    known = [getup.name for getup in found]
+def numbers(names: Sequence[str], getups: Sequence[GetUp]) -> list[int]:
+    """The numbers of the styles of those names; of all where none is named."""
+    known = [getup.name for getup in getups]
     unknown = [name for name in names if name not in known]
     if unknown:
         raise ConfigError(f"--only: expected styles of {', '.join(known)}, got {unknown[0]!r}")
-    return tuple(getup for getup in found if not names or getup.name in names)
+    return [number for number, name in enumerate(known) if not names or name in names]
 
 
 def write(file: Path, results: dict[str, ControlGain]) -> None:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from rich.table import Table
 
 from getup_jax.algo.learner import Learner
 from getup_jax.conditions import Plan
-from getup_jax.episodes import Episodes, Progress, Trace, run_episodes
+from getup_jax.episodes import Progress, run_episodes
 from getup_jax.motion.features import NAMES
 from getup_jax.tasks.build import BuiltTask
 from getup_jax.tasks.episode import LYING
@@ -71,7 +71,7 @@ class ControlGain:
     features: dict[str, FeatureGain]  # height, side_angle, front_angle
     edits: int  # variants of each curve
     curves: int
-    success: float  # share of the variants
+    success: float  # share of the variants; NaN where nobody looked
 
 
 def edited(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
@@ -86,18 +86,22 @@ def edited(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarr
     return np.clip(variants, lowest, highest)
 
 
-def edit_plan(task: BuiltTask, count: int, seed: int) -> Plan:
+def edit_plan(task: BuiltTask, count: int, seed: int, styles: Sequence[int] | None = None) -> Plan:
     """Each style and then `count` variants of it, all from the style's first lying start.
 
-    On irregular ground these are in the first region, which is flat.
+    styles: their numbers; None: all of the task. A style's variants do not depend on the others.
+    On irregular ground the starts are in the first region, which is flat.
     """
-    rng = np.random.default_rng(seed)
-    curves = [getup.points for getup in task.getups]
-    points = np.concatenate([np.stack([p, *edited(p, count, rng)]) for p in curves])
+    styles = range(len(task.getups)) if styles is None else styles
+    parts = []
+    for style in styles:
+        own, rng = task.getups[style].points, np.random.default_rng([seed, style])
+        parts += [own[None], edited(own, count, rng)]
+    points = np.concatenate(parts)
     episodes = len(points)
     return Plan(
         kind=LYING,
-        getup=np.repeat(np.arange(len(curves), dtype=np.int32), count + 1),
+        getup=np.repeat(np.asarray(styles, np.int32), count + 1),
         row=np.zeros(episodes, np.int32),
         duration_scale=np.ones(episodes, np.float32),
         impulse=np.zeros((episodes, 3)),
@@ -110,21 +114,23 @@ def measure(
     task: BuiltTask, learner: Learner, policy: Any, plan: Plan, progress: Progress
 ) -> ControlGain:
     """Run a plan of `edit_plan` and measure what its edits did."""
-    episodes = run_episodes(task, learner, policy, plan, progress)
-    curves = len(task.getups)
-    return ControlGain(
-        features=control_gain(of_episodes(episodes), task.environment.engine.control_dt),
-        edits=len(plan.getup) // curves - 1,
-        curves=curves,
-        success=success_of_edits(episodes.trace, curves),
-    )
-
-
-def of_episodes(episodes: Episodes) -> Responses:
-    """The responses in episodes of a plan of `edit_plan`."""
-    trace = episodes.trace
+    trace = run_episodes(task, learner, policy, plan, progress).trace
     rises = trace.running & (trace.time < trace.duration)
-    return of_values(trace.features, trace.target, rises, len(episodes.styles))
+    responses = of_values(trace.features, trace.target, rises, curves_of(plan))
+    success = _by_curve(trace.success, responses.curves)[:, :, 1:].any(axis=0).mean()
+    return gain_of(responses, task, float(success))
+
+
+def gain_of(responses: Responses, task: BuiltTask, success: float) -> ControlGain:
+    """The measure of responses in the task; success: share of the variants."""
+    edits = responses.used.shape[1] // responses.curves
+    gains = control_gain(responses, task.environment.engine.control_dt)
+    return ControlGain(gains, edits, responses.curves, success)
+
+
+def curves_of(plan: Plan) -> int:
+    """How many curves a plan of `edit_plan` has."""
+    return len(np.unique(plan.getup))
 
 
 def of_values(
@@ -143,11 +149,6 @@ def of_values(
     rises = _by_curve(rises, curves)
     used = rises[:, :, 1:] & rises[:, :, :1]
     return Responses(change(target), change(features), used.reshape(len(used), -1), curves)
-
-
-def success_of_edits(trace: Trace, curves: int) -> float:
-    """Share of success of the variants, in a trace of a plan of `edit_plan`."""
-    return float(_by_curve(trace.success, curves)[:, :, 1:].any(axis=0).mean())
 
 
 def control_gain(responses: Responses, control_dt: float) -> dict[str, FeatureGain]:

@@ -101,5 +101,5 @@ def test_the_bound_of_edits(built):
     found = bound(built, learner, policy, edit_plan(built, 1, seed=0), seen.append)
     assert seen == [1, 2, 3, 4]
     assert (found.edits, found.curves) == (1, 2)
-    assert 0.02 < found.features["height"].asked_rms < 0.08
+    assert 0.01 < found.features["height"].asked_rms < 0.1
     assert np.isfinite([row.gain for row in found.features.values()]).all()

@@ -20,7 +20,7 @@ from flax import struct
 
 from getup_jax.algo.learner import Learner
 from getup_jax.conditions import Plan
-from getup_jax.control_gain import ControlGain, control_gain, of_values
+from getup_jax.control_gain import ControlGain, curves_of, gain_of, of_values
 from getup_jax.episodes import Progress, plan_curves
 from getup_jax.motion.align import FEATURE_SCALE
 from getup_jax.search.sampling import Sampler
@@ -163,11 +163,9 @@ def bound(
         joined([steps.features for steps in found]),
         joined([steps.target for steps in found]),
         joined([s.time < t for s, t in zip(found, np.asarray(curves.duration), strict=True)]),
-        len(task.getups),
+        curves_of(plan),
     )
-    gains = control_gain(responses, task.environment.engine.control_dt)
-    edits = len(found) // len(task.getups) - 1
-    return ControlGain(gains, edits, len(task.getups), success=math.nan)
+    return gain_of(responses, task, success=math.nan)
 
 
 def _way_to(number: int, history: list[tuple[np.ndarray, Steps]]) -> Steps:
