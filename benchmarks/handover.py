@@ -1,6 +1,6 @@
 """How long a meta policy stays upright while hinges with new clips follow these, not its targets.
 
-    python benchmarks/handover.py [CONFIG] [key=value ...]
+    python benchmarks/handover.py [CONFIG] [key=value ...] [--quick]
 
 CONFIG: a YAML file with composite.meta and composite.rehearse (default:
 configs/composite_walk_aim.yaml). From starts along the clips, the new hinges' targets are those of
@@ -24,17 +24,22 @@ from getup_jax.composite.episodes import without_noise
 from getup_jax.rehearsal import clip_targets
 from getup_jax.settings import load_config
 from getup_jax.tasks.build_composite import build_composite
+from support.command import command
 
 SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)
 EPISODES, SECONDS = 64, 4
+QUICK = 8, 1  # episodes, s
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("config", nargs="?", default="configs/composite_walk_aim.yaml")
     parser.add_argument("settings", nargs="*", metavar="key=value")
-    args = parser.parse_args()
+    parser.add_argument("--quick", action="store_true", help="few short episodes, one share")
+    args = parser.parse_intermixed_args()
     config = load_config(args.config, args.settings)
+    shares = SHARES[:1] if args.quick else SHARES
+    episodes, seconds = QUICK if args.quick else (EPISODES, SECONDS)
     built = build_composite(config, print)
     env, world = with_meta(config, built)
     env = without_noise(env)
@@ -50,17 +55,17 @@ def main() -> None:
             upright &= output.metrics["ended_fall"] == 0
             return (state, upright), jnp.mean(upright)
 
-        first = (state, jnp.ones(EPISODES, bool))
+        first = (state, jnp.ones(episodes, bool))
         return jax.lax.scan(step, first, targets)[1]
 
     print("share of the meta policy, and of the episodes upright after 1, 2, ... s")
     run = jax.jit(alive)
     clips = clip_targets(built)[:, 0]
     whole = np.flatnonzero(np.isfinite(clips).all(axis=(1, 2)))
-    row = np.random.default_rng(0).choice(whole, EPISODES)
-    ahead = np.minimum(np.arange(SECONDS * rate), clips.shape[1] - 1)
+    row = np.random.default_rng(0).choice(whole, episodes)
+    ahead = np.minimum(np.arange(seconds * rate), clips.shape[1] - 1)
     targets = jnp.asarray(clips[row][:, ahead].swapaxes(0, 1), jnp.float32)
-    for share in SHARES:
+    for share in shares:
         started = built.environment.start(built.world, jnp.asarray(row), jax.random.PRNGKey(0))
         held = dataclasses.replace(env, first_share=share)
         state = held.adopt(world, started, started.goals, jax.random.PRNGKey(1))
@@ -69,4 +74,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

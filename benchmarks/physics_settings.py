@@ -28,6 +28,7 @@ from rich.table import Table
 from getup_jax.config import PhysicsConfig
 from getup_jax.motion.keyframes import load_authored
 from getup_jax.physics.character import CharacterSpec, load_character
+from support.command import command, positive
 
 BASE = PhysicsConfig(
     substeps=2, solver="pgs", iterations=10, gain_scale=1.5, armature=0.1, damping=1.0
@@ -56,7 +57,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)
     parser.add_argument("--quick", action="store_true", help="two settings, one round")
-    parser.add_argument("--rounds", type=int, default=3, help="of the speed trial (default: 3)")
+    parser.add_argument(
+        "--rounds", type=positive, default=3, help="of the speed trial (default: 3)"
+    )
     args = parser.parse_args()
     names = list(SETTINGS)[:2] if args.quick else list(SETTINGS)
     configs = {name: dataclasses.replace(BASE, **SETTINGS[name]) for name in names}
@@ -153,4 +156,4 @@ def show(rows: dict[str, dict]) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

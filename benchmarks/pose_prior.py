@@ -1,6 +1,7 @@
 """How good the pose prior of a config is, with and without its condition.
 
     python benchmarks/pose_prior.py [CONFIG] [section.key=value ...] [--no-standard] [--json FILE]
+    python benchmarks/pose_prior.py --quick      only to see that it works
 
 Trains (or takes from the cache) the conditional prior and the standard VAE of a config (default:
 flat.yaml) and measures both on the poses that were held out, at most 2,000 of them. Rows:
@@ -31,8 +32,10 @@ from getup_jax.nets.prior_training import PriorReport
 from getup_jax.paths import asset_path, cache_dir
 from getup_jax.physics.character import load_character
 from getup_jax.settings import load_config
+from support.command import command
 
 MOST = 2000  # poses in an evaluation
+QUICK = ["prior.epochs=1", "prior.min_updates=1", "motion.augment_poses=256"]
 Measured = tuple[PriorReport, PriorEvaluation]
 
 
@@ -40,9 +43,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("words", nargs="*", metavar="CONFIG | section.key=value")
     parser.add_argument("--no-standard", action="store_true", help="only the config's own prior")
+    parser.add_argument("--quick", action="store_true", help="few poses, one epoch: no quality")
     parser.add_argument("--json", type=Path)
-    args = parser.parse_args()
-    overrides = [word for word in args.words if "=" in word]
+    args = parser.parse_intermixed_args()
+    overrides = [word for word in args.words if "=" in word] + (QUICK if args.quick else [])
     names = [word for word in args.words if "=" not in word] or ["flat"]
     config = load_config(names[0], overrides)
     results = measure(config, (True,) if args.no_standard else (True, False))
@@ -102,4 +106,4 @@ def table(results: dict[str, Measured]) -> Table:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

@@ -1,6 +1,6 @@
 """Speed on irregular ground: the native engine on a height field against the plane, as a ratio.
 
-    python benchmarks/terrain.py [--json FILE] [--sims 256] [--seconds 20] [--drops 0]
+    python benchmarks/terrain.py [--json FILE] [--sims 256] [--seconds 20] [--drops N] [--quick]
 
 Lying characters under random hinge targets, the same number everywhere: on the plane, and in every
 region of the ground of configs/terrain.yaml. All are timed in turn again and again, so that a busy
@@ -32,10 +32,12 @@ from getup_jax.physics.terrain_map import REGIONS, TerrainMap, make_terrain
 from getup_jax.settings import load_config
 from getup_jax.tasks.falls import DROPS, evenly, fall
 from getup_jax.tasks.observation import GRID_POINTS
+from support.command import command, duration, positive
 
 STEPS = 10  # control steps of one round
 TARGET_STD_RAD = 0.3
 MIN_ROUNDS = 5
+QUICK_SIMS = 8
 LOOK_UPS = "look-ups"
 
 
@@ -72,10 +74,16 @@ def parse_args() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--json", type=Path, metavar="FILE")
-    parser.add_argument("--sims", type=int, default=256, metavar="N")
-    parser.add_argument("--seconds", type=float, default=20.0, metavar="S", help="to measure for")
-    parser.add_argument("--drops", type=int, default=0, metavar="N")
-    return parser.parse_args()
+    parser.add_argument("--sims", type=positive, default=256, metavar="N")
+    parser.add_argument(
+        "--seconds", type=duration, default=20.0, metavar="S", help="to measure for"
+    )
+    parser.add_argument("--drops", type=positive, metavar="N", help="rag-dolls (default: none)")
+    parser.add_argument("--quick", action="store_true", help="8 simulations, the fewest rounds")
+    args = parser.parse_args()
+    if args.quick:
+        args.sims, args.seconds = QUICK_SIMS, 0.0
+    return args
 
 
 class Ground:
@@ -197,4 +205,4 @@ def show(result: dict) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

@@ -1,20 +1,29 @@
 """Control steps per second of the physics, of collecting experience and of training.
 
-    python benchmarks/throughput.py [--json FILE] [--engine native] [--num-envs 512]
+    python benchmarks/throughput.py [--config flat] [--json FILE] [section.key=value ...]
 
-Four parts, timed in turn again and again, so that a busy machine slows all of them alike; the
-median of the rounds is reported.
+For every shipped config and those of your own. All rows are control steps/s of all simulations
+together (one simulation at 30 Hz would need 30), timed in turn again and again, so that a busy
+machine slows all of them alike. Reported are the median of the rounds, the fastest and the slowest
+one, and the median of the rounds' ratios to raw.
 
-  raw        the engine alone, with the hinge targets that the rollout sends it. native: a plain
-             `mujoco.batch.Batch` loop without JAX; mjx: a jitted scan
+  raw        the engine alone, given what the rollout gives it: hinge targets, forces of the helping
+             hand, balls, states of episodes that start anew. native: a plain `mujoco.batch.Batch`
+             loop without JAX, checked to come to the rollout's states in every step, bit for bit;
+             mjx: a jitted scan
   rollout    the same control steps inside jit: policy, pose prior, observation, reward, resets
-  update     values, GAE and all epochs of PPO on the rollout's samples
-  iteration  one whole training iteration, as `getup-train` runs it
+  update     the rest of an iteration, on the rollout's samples: discriminators, values, GAE and all
+             epochs of PPO
+  iteration  one whole training iteration, the first one again and again
+  training   training as it runs: one iteration after the other, from the state that --warm-up
+             seconds of training lead to, with the resets of the episodes that end meanwhile
 
-All start from the same lying characters, take the same number of control steps with the actions of
-the untrained policy, and no episode ends meanwhile, so raw and rollout do the same physical work;
-with native it is checked that they end in the same states, bit for bit.
-The pose prior is untrained and the get-ups are made up: only their sizes matter here.
+The first four begin with the first episodes and take the same steps; there hardly an episode ends.
+The policy is untrained, whatever train.init_from names: bodies fall soon, so that resets are as
+frequent as they get; how many episodes ended is said below the table. The task and its start states
+are the config's own, but for their number (as many as simulations). A pose prior that is neither
+shipped nor in the cache is trained first. Where recordings that the config names are not here, the
+authored motions stand in for them.
 """
 
 from __future__ import annotations
@@ -22,230 +31,119 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import math
 import os
 import platform
 import statistics
 import time
-from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import jax
-import jax.numpy as jnp
-import mujoco
-import numpy as np
-from mujoco.batch import Batch
 from rich.console import Console
 from rich.table import Table
 
-from getup_jax.algo.estimate import estimate
-from getup_jax.algo.learner import Learner, make_learner
-from getup_jax.algo.rollout import Rollout, rollout
 from getup_jax.algo.state import TrainState
 from getup_jax.config import Config
-from getup_jax.motion.clips import Clip, GetUp
-from getup_jax.motion.curves import NUM_POINTS
-from getup_jax.nets import gaussian
-from getup_jax.nets.cvae import CVAE, init_variables
-from getup_jax.nets.prior import PosePrior
-from getup_jax.nets.prior_data import pose_conditions
-from getup_jax.physics.character import CharacterSpec, load_character
-from getup_jax.settings import load_config
-from getup_jax.tasks.build import BuiltTask, assemble
-from getup_jax.tasks.episode import EpisodeState
-from getup_jax.tasks.getup import GetUpTask
-from getup_jax.types import PhysicsState, StepOutput
+from getup_jax.train import build_job
+from support.command import command, duration, positive
+from support.replay import Run, engine_of, raw_run
+from support.setting import make_config
 
-NUM_STEPS = 8  # short, so that many rounds fit; rates do not depend on it
+UNIT = "control steps/s"
+RAW, TRAINING = "raw", "training"
+WARM_UP_S = (
+    3.0  # simulated; falls come after a second at the latest, and at different times by then
+)
 MIN_ROUNDS = 3
-POSE_STD_RAD = 0.3  # of the made-up poses that scale the prior's output
-
-Run = Callable[[], Any]
 
 
 def main() -> None:
     args = parse_args()
-    config = make_config(args)
-    task = make_task(config)
-    learner = make_learner(
-        task.environment, config.network, config.ppo, total_steps=config.train.total_steps
-    )
-    state = jax.jit(learner.init)(task.world, jax.random.PRNGKey(config.seed))
-    parts = make_parts(config, task, learner, state)
-    seconds = measure(parts, args.seconds)
-    result = report(config, task, seconds)
-    show(result, seconds)
+    config = make_config(args, print)
+    parts = Parts.of(config, args)
+    seconds = measure(parts.runs, 0.0 if args.quick else args.seconds)
+    result = report(config, parts, seconds)
+    show(result)
     if args.json is not None:
         args.json.write_text(json.dumps(result, indent=2) + "\n")
 
 
 def parse_args() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path, help="write the result to this file")
-    parser.add_argument("--engine", help="auto, native, mjx or mjx-warp; default: the config's")
-    parser.add_argument("--num-envs", type=int, help="simulations; default: the config's")
-    parser.add_argument("--num-steps", type=int, default=NUM_STEPS, help="control steps a round")
-    parser.add_argument("--config", default="flat", help="a config file or a shipped config")
-    parser.add_argument("--seconds", type=float, default=8.0, help="for the timed rounds")
-    return parser.parse_args()
-
-
-def make_config(args: argparse.Namespace) -> Config:
-    """The config with lying starts, episodes that do not end and the given batch."""
-    config = load_config(args.config)
-    physics, ppo = config.physics, config.ppo
-    if args.engine is not None:
-        solver = "auto" if args.engine.startswith("mjx") else physics.solver
-        physics = dataclasses.replace(physics, engine=args.engine, solver=solver)
-    num_envs = args.num_envs or ppo.num_envs
-    batch = num_envs * args.num_steps
-    ppo = dataclasses.replace(
-        ppo,
-        num_envs=num_envs,
-        num_steps=args.num_steps,
-        minibatch_size=math.gcd(ppo.minibatch_size, batch),
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    task = dataclasses.replace(
-        config.task, stand_start=0.0, clip_start=0.0, pool_size=num_envs, terminate_after_s=1e6
-    )
-    return dataclasses.replace(config, physics=physics, ppo=ppo, task=task)
-
-
-def make_task(config: Config) -> BuiltTask:
-    character = load_character(config.physics)
-    # longer than any rollout: the time limit would end episodes, too
-    duration = 1.0 + config.ppo.num_steps / config.physics.control_hz
-    getups = [make_getup(character, side, duration) for side in (1.0, -1.0)]
-    return assemble(config, character, getups, make_prior(config, character), lambda text: None)
-
-
-def make_getup(character: CharacterSpec, side: float, duration: float) -> GetUp:
-    """Straight curves from lying prone (side 1) or supine (-1) to standing."""
-    lying = character.neutral_qpos.copy()
-    lying[2] = 0.2
-    lying[3:7] = math.cos(math.pi / 4), 0.0, side * math.sin(math.pi / 4), 0.0
-    qpos = np.stack([lying, character.neutral_qpos])
-    first, last = pose_conditions(qpos, character)
-    clip = Clip("made up", fps=1.0 / duration, qpos=qpos)
-    return GetUp("made up", duration, np.linspace(first, last, NUM_POINTS), clip)
-
-
-def make_prior(config: Config, character: CharacterSpec) -> PosePrior:
-    """A pose prior of the config's size with random weights."""
-    rng, joints, latent = np.random.default_rng(0), character.num_joints, config.prior.latent_size
-    poses = character.neutral_qpos[7:] + POSE_STD_RAD * rng.normal(size=(256, joints))
-    conditions = rng.normal(1.0, 0.5, (256, 3))
-    model = CVAE(joints, latent, config.prior.hidden_sizes, config.prior.conditional)
-    return PosePrior(
-        variables=init_variables(model, jax.random.PRNGKey(0), poses, conditions),
-        latent_mean=jnp.zeros(latent),
-        latent_std=jnp.ones(latent),
-        joint_lower=jnp.asarray(character.joint_lower, jnp.float32),
-        joint_upper=jnp.asarray(character.joint_upper, jnp.float32),
-    )
-
-
-def make_parts(
-    config: Config, task: BuiltTask, learner: Learner, state: TrainState
-) -> dict[str, Run]:
-    """The four parts as functions that return when they are done; all are warmed up here."""
-    world, key = task.world, jax.random.PRNGKey(1)
-    options = task.environment.engine.compiler_options
-    collect = jax.jit(
-        lambda world, state, key: collected(learner, world, state, key), compiler_options=options
-    )
-    experience = collect(world, state, key)
-    samples, last = experience.transition, experience.environment.physics
-    if bool(jnp.any(samples.terminated | samples.truncated)):
-        raise SystemExit("an episode ended during the rollout: raw and rollout would differ")
-    targets, samples = np.asarray(samples.extras), samples.replace(extras=None)
-    update = jax.jit(lambda state, samples, key: updated(learner, state, samples, key))
-    # not donated, since every round starts from the same state
-    iteration = jax.jit(learner.iteration, compiler_options=options)
-    parts: dict[str, Run] = {
-        "raw": raw_run(config, task.environment.engine, state, targets, last),
-        "rollout": lambda: jax.block_until_ready(collect(world, state, key)),
-        "update": lambda: jax.block_until_ready(update(state, samples, key)),
-        "iteration": lambda: jax.block_until_ready(iteration(world, state)),
-    }
-    for part in parts.values():
-        part()
-    return parts
+    add = parser.add_argument
+    add("settings", nargs="*", metavar="section.key=value", help="changes of the config")
+    add("--config", default="flat", help="a config file or a shipped config (default: flat)")
+    add("--json", type=Path, metavar="FILE", help="write the result to this file")
+    add("--engine", help="auto, native, mjx or mjx-warp; default: the config's")
+    add("--num-envs", type=positive, metavar="N", help="simulations; default: the config's")
+    add("--num-steps", type=positive, metavar="N", help="control steps a round (default: 8)")
+    add("--seconds", type=duration, default=8.0, metavar="S", help="of timed rounds (default: 8)")
+    add("--warm-up", type=duration, default=WARM_UP_S, metavar="S", help="simulated (default: 3)")
+    add("--quick", action="store_true", help="smallest sizes, to see that it works: no rates")
+    return parser.parse_intermixed_args()
 
 
 @dataclasses.dataclass(frozen=True)
-class Recorded:
-    """The task, which also gives what it sends to the engine [B, J] (rad)."""
+class Parts:
+    """What is timed."""
 
-    task: GetUpTask
+    runs: dict[str, Run]  # each returns when it is done
+    training: Training
+    engine: str
 
-    def step(
-        self, world: Any, state: EpisodeState, action: jax.Array
-    ) -> tuple[EpisodeState, StepOutput]:
-        after, output = self.task.step(world, state, action)
-        return after, output.replace(extras=self.task.servo_target(world, state, after.action))
-
-
-def collected(learner: Learner, world: Any, state: TrainState, key: jax.Array) -> Rollout:
-    env, policy = Recorded(learner.env), make_policy(learner, state)
-    return rollout(env, world, state.environment, policy, key, learner.config.num_steps)
-
-
-def make_policy(learner: Learner, state: TrainState) -> Callable:
-    std = learner.stage(state).action_std
-
-    def policy(observation: jax.Array, key: jax.Array) -> tuple[jax.Array, jax.Array]:
-        mean = learner.act(state.learner.policy, observation)
-        action = gaussian.sample(key, mean, std)
-        return action, gaussian.log_prob(action, mean, std)
-
-    return policy
-
-
-def updated(learner: Learner, state: TrainState, samples: Any, key: jax.Array) -> Any:
-    current, batch, _ = estimate(learner.model, state.learner, samples, learner.config)
-    return learner._improve(current, batch, learner.stage(state), key)
-
-
-def raw_run(
-    config: Config, engine: Any, state: TrainState, targets: np.ndarray, last: PhysicsState
-) -> Run:
-    """The engine alone, from the rollout's start states to its last ones."""
-    first = state.environment.physics
-    if engine.name != "native":
-        return scan_run(engine, first, jnp.asarray(targets))
-    rows = np.array(first.engine).view(np.float64)
-    threads = config.physics.threads or len(os.sched_getaffinity(0))
-    batch = Batch(engine.model, len(rows), threads, persistent=True)
-    stage = mujoco.mjtStage.mjSTAGE_VEL.value
-
-    def run() -> None:
-        batch.state[...] = rows
-        for ctrl in targets:
-            batch.ctrl = ctrl
-            batch.step(nstep=config.physics.substeps, stage=stage)
-
-    run()
-    if not np.array_equal(batch.state, np.array(last.engine).view(np.float64)):
-        raise SystemExit("raw and rollout end in different states: their rates do not compare")
-    return run
+    @classmethod
+    def of(cls, config: Config, args: argparse.Namespace) -> Parts:
+        """The five parts, all compiled and warmed up."""
+        job = build_job(config, print)
+        learner, engine = job.learner, engine_of(job.learner.env)
+        options = engine.compiler_options
+        world = jax.device_put(job.world)
+        state = jax.jit(learner.init)(world, jax.random.PRNGKey(config.seed))
+        collect = jax.jit(learner.collect, compiler_options=options)
+        learn = jax.jit(learner.learn)
+        # not donated, since the first one is repeated
+        iterate = jax.jit(learner.iteration, compiler_options=options)
+        collected, training = collect(world, state), Training(iterate, world, state)
+        runs: dict[str, Run] = {
+            RAW: raw_run(learner, config.physics, world, state),
+            "rollout": lambda: jax.block_until_ready(collect(world, state)),
+            "update": lambda: jax.block_until_ready(learn(world, state, collected)),
+            "iteration": lambda: jax.block_until_ready(iterate(world, state)),
+            TRAINING: training.run,
+        }
+        for run in runs.values():
+            run()
+        training.warm_up(args.warm_up, config.ppo.num_steps * engine.control_dt)
+        return cls(runs, training, engine.name)
 
 
-def scan_run(engine: Any, first: PhysicsState, targets: jax.Array) -> Run:
-    def play(state: PhysicsState, targets: jax.Array) -> PhysicsState:
-        return jax.lax.scan(lambda s, ctrl: (engine.step(s, ctrl), None), state, targets)[0]
+class Training:
+    """Iterations one after the other; what they say of episodes is kept."""
 
-    compiled = jax.jit(play, compiler_options=engine.compiler_options)
-    return lambda: jax.block_until_ready(compiled(first, targets))
+    def __init__(self, iterate: Any, world: Any, state: TrainState) -> None:
+        self._iterate, self._world, self._state = iterate, world, state
+        self.ended: list[float] = []  # episodes that ended, an iteration
+
+    def run(self) -> None:
+        """The next iteration."""
+        self._state, metrics = jax.block_until_ready(self._iterate(self._world, self._state))
+        self.ended.append(float(metrics["episode/count"]))
+
+    def warm_up(self, seconds: float, iteration_s: float) -> None:
+        """Iterations for so many simulated seconds; their episodes do not count."""
+        for _ in range(round(seconds / iteration_s)):
+            self.run()
+        self.ended.clear()
 
 
 def measure(parts: dict[str, Run], budget_s: float) -> dict[str, list[float]]:
     """Seconds of every part in every round."""
     seconds: dict[str, list[float]] = {name: [] for name in parts}
     begin = time.perf_counter()
-    while len(seconds["raw"]) < MIN_ROUNDS or time.perf_counter() - begin < budget_s:
+    while len(seconds[RAW]) < MIN_ROUNDS or time.perf_counter() - begin < budget_s:
         for name, part in parts.items():
             start = time.perf_counter()
             part()
@@ -253,14 +151,25 @@ def measure(parts: dict[str, Run], budget_s: float) -> dict[str, list[float]]:
     return seconds
 
 
-def report(config: Config, task: BuiltTask, seconds: dict[str, list[float]]) -> dict[str, Any]:
+def rates(seconds: list[float], raw: list[float], steps: int) -> dict[str, float]:
+    """Of one part: median and spread of its rounds (control steps/s), and of its ratios to raw."""
+    of_raw = statistics.median(r / s for r, s in zip(raw, seconds, strict=True))
+    found = [steps / statistics.median(seconds), steps / max(seconds), steps / min(seconds)]
+    names = ("median", "slowest", "fastest")
+    return {n: round(x, 1) for n, x in zip(names, found, strict=True)} | {
+        "of_raw": round(of_raw, 4)
+    }
+
+
+def report(config: Config, parts: Parts, seconds: dict[str, list[float]]) -> dict[str, Any]:
+    """Plain values for JSON."""
     ppo, physics = config.ppo, config.physics
-    steps = ppo.num_envs * ppo.num_steps
-    rates = {name: steps / statistics.median(times) for name, times in seconds.items()}
+    steps, rounds = ppo.num_envs * ppo.num_steps, len(seconds[RAW])
+    ended = sum(parts.training.ended) / (rounds * steps)
     return {
-        **{name: round(rate, 1) for name, rate in rates.items()},
-        "rollout_ratio": round(rates["rollout"] / rates["raw"], 4),
-        "iteration_ratio": round(rates["iteration"] / rates["raw"], 4),
+        "unit": UNIT,
+        "parts": {name: rates(times, seconds[RAW], steps) for name, times in seconds.items()},
+        "episodes_ended_per_1000_steps": round(1000 * ended, 2),
         "versions": {
             "python": platform.python_version(),
             **{name: version(name) for name in ("getup-jax", "jax", "mujoco", "mujoco-mjx")},
@@ -272,7 +181,7 @@ def report(config: Config, task: BuiltTask, seconds: dict[str, list[float]]) -> 
             "system": platform.platform(),
         },
         "settings": {
-            "engine": task.environment.engine.name,
+            "engine": parts.engine,
             "solver": physics.solver,
             "substeps": physics.substeps,
             "iterations": physics.iterations,
@@ -281,7 +190,8 @@ def report(config: Config, task: BuiltTask, seconds: dict[str, list[float]]) -> 
             "epochs": ppo.epochs,
             "minibatch_size": ppo.minibatch_size,
             "hidden_sizes": list(config.network.hidden_sizes),
-            "rounds": len(seconds["raw"]),
+            "motions": list(config.motion.source),
+            "rounds": rounds,
         },
     }
 
@@ -294,24 +204,20 @@ def processor() -> str:
     return names[0] if names else platform.processor()
 
 
-def show(result: dict[str, Any], seconds: dict[str, list[float]]) -> None:
+def show(result: dict[str, Any]) -> None:
     settings, machine = result["settings"], result["machine"]
     title = "{engine}, {num_envs} simulations x {num_steps} steps, {rounds} rounds"
-    title = title.format(**settings)
-    table = Table("part", "control steps/s", "of raw", "fastest", "slowest", title=title)
-    steps = settings["num_envs"] * settings["num_steps"]
-    for name, times in seconds.items():
-        table.add_row(
-            name,
-            f"{result[name]:,.0f}",
-            f"{result[name] / result['raw']:.2f}",
-            f"{steps / min(times):,.0f}",
-            f"{steps / max(times):,.0f}",
-        )
+    table = Table("part", UNIT, "of raw", "slowest", "fastest", title=title.format(**settings))
+    for name, row in result["parts"].items():
+        label = "training as it runs" if name == TRAINING else name
+        found = [f"{row[key]:,.0f}" for key in ("median", "slowest", "fastest")]
+        table.add_row(label, found[0], f"{row['of_raw']:.2f}", *found[1:])
     console = Console(width=100)
     console.print(table)
+    ended = result["episodes_ended_per_1000_steps"]
+    console.print(f"training as it runs: {ended:g} episodes ended in 1,000 control steps")
     console.print(f"{machine['processor']}, {machine['cpus']} CPUs; {machine['device']}")
 
 
 if __name__ == "__main__":
-    main()
+    command(main)

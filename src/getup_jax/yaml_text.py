@@ -15,6 +15,7 @@ from getup_jax.config.check import shown
 
 MOST_BYTES = 500_000
 _DEEPEST = 40  # nested lists and mappings
+_LONGEST = 120  # characters of what the parser says, which quotes the text
 
 
 class YamlError(ValueError):
@@ -36,7 +37,8 @@ def parse(text: str | bytes) -> Any:
         return yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
-        raise YamlError(error.problem or "not YAML", mark and mark.line + 1) from None
+        problem = (error.problem or "not YAML")[:_LONGEST]
+        raise YamlError(problem, mark and mark.line + 1) from None
     except yaml.reader.ReaderError as error:
         found = f"0x{error.character:02x} at position {error.position}"
         raise YamlError(f"not text: {error.reason} ({found})") from None

@@ -81,11 +81,19 @@ class Learner:
 
         Jit it once and donate the state: `jax.jit(learner.iteration, donate_argnums=1)`.
         """
-        # Folded in, so that a run that resumes here draws what the unbroken one would have.
-        key = jax.random.fold_in(state.key, state.iteration)
-        key_rollout, key_update = jax.random.split(key)
-        stage = self.stage(state)
-        collected = self._collect(world, state, stage, key_rollout)
+        return self.learn(world, state, self.collect(world, state))
+
+    def collect(self, world: Any, state: TrainState) -> Rollout:
+        """The first part of an iteration: T steps of all B simulations."""
+        key_rollout, _ = jax.random.split(_iteration_key(state))
+        return self._collect(world, state, self.stage(state), key_rollout)
+
+    def learn(
+        self, world: Any, state: TrainState, collected: Rollout
+    ) -> tuple[TrainState, dict[str, jax.Array]]:
+        """The rest of an iteration: all that is done with what `collect` gave."""
+        key, stage = _iteration_key(state), self.stage(state)
+        _, key_update = jax.random.split(key)
         learner, transition, judged = self._judge(
             world, state.learner, collected.transition, jax.random.fold_in(key, _JUDGE)
         )
@@ -198,6 +206,11 @@ class Learner:
     def improver(self) -> Improver:
         """The updates, with this learner's networks and settings."""
         return Improver(self.model, self.config, self.weights)
+
+
+def _iteration_key(state: TrainState) -> jax.Array:
+    """Folded in, so that a run that resumes here draws what the unbroken one would have."""
+    return jax.random.fold_in(state.key, state.iteration)
 
 
 def _select(mask: jax.Array, a: LearnerState, b: LearnerState) -> LearnerState:

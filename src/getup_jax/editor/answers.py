@@ -10,11 +10,15 @@ from getup_jax.editor.export import export
 from getup_jax.editor.imports import curves_of
 from getup_jax.editor.messages import Request
 from getup_jax.editor.session import Session
+from getup_jax.motion.apart import Stop
 from getup_jax.motion.curve_file import dump, parse_text
 
 
-def answer(request: Request, session: Session) -> str | bytes:
-    """The answer to a request that may take a while; runs in a thread of its own."""
+def answer(request: Request, session: Session, stop: Stop) -> str | bytes:
+    """The answer to a request that may take a while; runs in a thread of its own.
+
+    Raises AbandonedError soon after the stop is set, without an answer.
+    """
     header: dict[str, Any] = {"number": request.number}
     if request.type == "load":
         curve = parse_text(request.content, request.name)
@@ -22,12 +26,14 @@ def answer(request: Request, session: Session) -> str | bytes:
         return json.dumps({"type": "curves", **header, "curves": [curve.plain()]})
     if request.type == "import":
         assert isinstance(request.content, bytes)
-        curves = curves_of(request.name, request.content, session.simulator.character)
+        curves = curves_of(request.name, request.content, session.simulator.character, stop)
         return json.dumps({"type": "curves", **header, "curves": [c.plain() for c in curves]})
     assert request.curve is not None
     if request.type == "save":
         name = f"{request.curve.name}.yaml"
         return messages.pack({"type": "file", **header, "name": name}, dump(request.curve).encode())
-    content = export(session.motion(request), session.simulator.character, request.format)
+    motion = session.motion(request)
+    stop.check()
+    content = export(motion, session.simulator.character, request.format, stop)
     name = f"{request.curve.name}.{request.format}"
     return messages.pack({"type": "file", **header, "name": name}, content)

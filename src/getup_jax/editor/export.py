@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from getup_jax import video
 from getup_jax.editor.simulate import Motion
+from getup_jax.motion.apart import Stop
 from getup_jax.motion.bvh_writer import write_bvh
 from getup_jax.motion.curve_file import dump
 from getup_jax.motion.features import NAMES
@@ -27,8 +28,8 @@ FORMATS = ("bvh", "npz", "csv", "mp4")
 _SOURCE = "getup-edit"
 
 
-def export(motion: Motion, character: CharacterSpec, kind: str) -> bytes:
-    """The content of a file of one of the FORMATS."""
+def export(motion: Motion, character: CharacterSpec, kind: str, stop: Stop | None = None) -> bytes:
+    """The content of a file of one of the FORMATS; a film ends early once it is stopped."""
     if kind == "csv":
         return to_csv(motion, character).encode()
     if kind == "npz":
@@ -38,7 +39,7 @@ def export(motion: Motion, character: CharacterSpec, kind: str) -> bytes:
         if kind == "bvh":
             write_bvh(recording(motion, character), path)
         else:
-            _film(motion, character, path)
+            _film(motion, character, path, stop or Stop())
         return path.read_bytes()
 
 
@@ -137,7 +138,7 @@ def _ends(character: CharacterSpec) -> dict[int, np.ndarray]:
     }
 
 
-def _film(motion: Motion, character: CharacterSpec, path: Path) -> None:
+def _film(motion: Motion, character: CharacterSpec, path: Path, stop: Stop) -> None:
     imageio = video.require()
     images = video.pictures(character.model, motion.frames.qpos)
     with warnings.catch_warnings():
@@ -146,4 +147,5 @@ def _film(motion: Motion, character: CharacterSpec, path: Path) -> None:
         fps = round(1.0 / motion.control_dt)
         with imageio.get_writer(path, fps=fps, macro_block_size=8) as writer:
             for image in images:
+                stop.check()
                 writer.append_data(video.caption(image, motion.curve.name))

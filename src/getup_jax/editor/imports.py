@@ -11,21 +11,34 @@ from pathlib import Path
 import numpy as np
 
 from getup_jax.editor.starts import reference_curve
-from getup_jax.motion.cache import Job, read_npz, retarget_files
+from getup_jax.motion.apart import Stop, run_apart
+from getup_jax.motion.cache import kept, read_npz
 from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.curve_file import DURATION_S, CurveFile
 from getup_jax.motion.getups import find_getups
+from getup_jax.motion.guard import one_line
+from getup_jax.motion.job import Job
 from getup_jax.motion.readers import SUFFIXES, ReadOptions
 from getup_jax.motion.retarget import RetargetSettings
 from getup_jax.physics.character import CharacterSpec
 
 _MAX_UNPACKED_BYTES = 256_000_000  # of an npz file, which may be packed very tightly
+_WORKER_BYTES = 4_000_000_000  # of memory, for a file of at most 32 MB
+_MOST_FRAMES = 100_000  # almost an hour
+_STEM_BYTES = 120
 _MOST = 20  # get-ups taken from one file
 _DIGITS = 6  # of the start pose
 
 
-def curves_of(name: str, content: bytes, character: CharacterSpec) -> list[CurveFile]:
-    """The curve of every get-up in a motion file, each with the start pose of its own."""
+def curves_of(
+    name: str, content: bytes, character: CharacterSpec, stop: Stop | None = None
+) -> list[CurveFile]:
+    """The curve of every get-up in a motion file, each with the start pose of its own.
+
+    Raises MotionError with the file's name and no other path, and AbandonedError once it is
+    stopped.
+    """
+    stop = stop or Stop()
     suffix = Path(name).suffix.lower()
     known = (*SUFFIXES, ".npz")
     if suffix not in known or suffix == ".amc":
@@ -33,11 +46,15 @@ def curves_of(name: str, content: bytes, character: CharacterSpec) -> list[Curve
         raise MotionError(f"{name}: expected a file that ends in {takes}")
     if suffix == ".npz":
         _check_unpacked(name, content)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{_plain(Path(name).stem)}{suffix}"
-        path.write_bytes(content)
-        clip = _clip(path, character)
-    _, getups = find_getups(clip, character)
+    clip = _clip(name, content, character, stop)
+    if len(clip.qpos) > _MOST_FRAMES:
+        raise MotionError(
+            f"{name}: expected at most {_MOST_FRAMES} frames, got {len(clip.qpos)}; cut it into "
+            "parts"
+        )
+    stop.check()
+    with one_line(name):
+        _, getups = find_getups(clip, character)
     if not getups:
         raise MotionError(
             f"{name}: no get-up in {clip.duration:.0f} s; expected a body that lies on the floor "
@@ -51,8 +68,8 @@ def _check_unpacked(name: str, content: bytes) -> None:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as file:
             size = sum(part.file_size for part in file.infolist())
-    except (zipfile.BadZipFile, ValueError, OSError) as error:
-        raise MotionError(f"{name}: not a clip: {error}") from None
+    except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError):
+        raise MotionError(f"{name}: not a clip: expected an .npz file of getup-motion") from None
     if size > _MAX_UNPACKED_BYTES:
         raise MotionError(
             f"{name}: expected at most {_MAX_UNPACKED_BYTES // 1_000_000} MB unpacked, got "
@@ -60,14 +77,26 @@ def _check_unpacked(name: str, content: bytes) -> None:
         )
 
 
-def _clip(path: Path, character: CharacterSpec) -> Clip:
+def _clip(name: str, content: bytes, character: CharacterSpec, stop: Stop) -> Clip:
+    """The file's motion; what is said of it speaks of the name that its owner knows."""
+    own = Path(name)
+    with tempfile.TemporaryDirectory() as folder:
+        # letters may take four bytes each, and a name of a file 255 in all
+        stem = _plain(own.stem).encode()[:_STEM_BYTES].decode(errors="ignore")
+        path = Path(folder) / f"{stem}{own.suffix.lower()}"
+        path.write_bytes(content)
+        try:
+            return _retargeted(path, character, stop)
+        except MotionError as error:
+            text = str(error).replace(str(path), name).replace(path.name, name)
+            raise MotionError(text.replace(f"{folder}/", "")) from error
+
+
+def _retargeted(path: Path, character: CharacterSpec, stop: Stop) -> Clip:
     if path.suffix == ".npz":
         return read_npz(path, character)[0]
     job = Job(path, character, ReadOptions(allow_short=True), RetargetSettings())
-    (result,) = retarget_files([job], workers=1, apart=True)
-    if isinstance(result, MotionError):
-        raise result
-    return result[0]
+    return kept(job, lambda job: run_apart(job, stop, _WORKER_BYTES))[0]
 
 
 def _curve(getup: GetUp) -> CurveFile:

@@ -14,7 +14,6 @@ import itertools
 import json
 import signal
 import sys
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -24,17 +23,15 @@ from websockets.exceptions import ConnectionClosed
 from getup_jax import checkpoint
 from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.editor import messages
-from getup_jax.editor.answers import answer
-from getup_jax.editor.messages import Request
 from getup_jax.editor.outbox import Outbox
 from getup_jax.editor.scene import describe
 from getup_jax.editor.session import Session, error_message
 from getup_jax.editor.simulate import Simulator
 from getup_jax.editor.site import Site
+from getup_jax.editor.work import Work
 
 _MAX_BYTES = messages.MAX_FILE_BYTES + messages.MAX_TEXT_BYTES
 _MAX_PAGES = 16
-_SLOW = 2  # imports and exports at once
 
 Build = Callable[[Callable[[str], None]], tuple[Session, dict[str, Any]]]
 
@@ -76,7 +73,7 @@ class App:
         self._boxes: dict[int, Outbox] = {}
         self._session: Session | None = None
         self._hello = _status("starting", "loading")
-        self._slow = asyncio.Semaphore(_SLOW)
+        self._work = Work()
 
     async def run(self, host: str, port: int, ready: Callable[[str], None] = print) -> None:
         """Serve until the task is cancelled or SIGTERM comes."""
@@ -154,22 +151,19 @@ class App:
         self._boxes[page] = box
         box.put(self._hello)
         sender = asyncio.create_task(box.drain())
-        tasks: set[asyncio.Task[None]] = set()
         try:
             async for message in connection:
-                self._receive(page, message, box, tasks)
+                self._receive(page, message, box)
         except ConnectionClosed:
             pass
         finally:
             del self._boxes[page]
             if self._session is not None:
                 self._session.forget(page)
-            for task in (sender, *tasks):
-                task.cancel()
+            self._work.abandon(box)
+            sender.cancel()
 
-    def _receive(
-        self, page: int, message: str | bytes, box: Outbox, tasks: set[asyncio.Task[None]]
-    ) -> None:
+    def _receive(self, page: int, message: str | bytes, box: Outbox) -> None:
         """Pass a request on; what is wrong with it is said, and nothing else happens."""
         request = None
         try:
@@ -178,23 +172,9 @@ class App:
                 raise messages.MessageError("not ready yet; ask again when the page says ready")
             if request.type == "simulate":
                 self._session.submit(page, request, box.put_from_thread)
-                return
-            if len(tasks) >= _SLOW:
-                raise messages.MessageError("busy with earlier files; try again in a moment")
-        except ValueError as error:
-            box.put(error_message(request, error))
-            return
-        task = asyncio.create_task(self._answer_later(request, self._session, box))
-        tasks.add(task)
-        task.add_done_callback(tasks.discard)
-
-    async def _answer_later(self, request: Request, session: Session, box: Outbox) -> None:
-        try:
-            async with self._slow:
-                box.put(await asyncio.to_thread(answer, request, session))
-        except Exception as error:  # told to the page, the server lives
-            if not type(error).__module__.startswith("getup_jax."):
-                warnings.warn(f"{request.type}: {type(error).__name__}: {error}", stacklevel=2)
+            else:
+                self._work.start(request, self._session, box)
+        except Exception as error:  # told to the page, whose connection lives
             box.put(error_message(request, error))
 
 

@@ -129,10 +129,11 @@ class Session:
 
 
 def error_message(request: Request | None, error: Exception) -> str:
-    """What a page is told; errors that are not for users keep their type's name."""
-    known = type(error).__module__.startswith("getup_jax.")
-    text = str(error) if known else f"{type(error).__name__}: {error}"
-    answer: dict[str, Any] = {"type": "error", "text": text[:2000]}
+    """What a page is told: one line. What is not meant for users is only named."""
+    text = str(error)
+    if not type(error).__module__.startswith("getup_jax."):
+        text = f"the editor failed at this ({type(error).__name__}); please report how it came"
+    answer: dict[str, Any] = {"type": "error", "text": " ".join(text.split())[:2000]}
     if request is not None:
         answer |= {"number": request.number, "of": request.type}
     return json.dumps(answer)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hmac
+import re
 import urllib.parse
 from http import HTTPStatus
 from pathlib import Path
@@ -21,6 +22,10 @@ _TYPES = {
     ".css": "text/css; charset=utf-8",
     ".svg": "image/svg+xml",
 }
+# A name or an IPv4 address, or an IPv6 address in brackets; then perhaps a port. Nothing else: what
+# a lenient reader would take for the name may be what stands before an @.
+_HOST = re.compile(r"(?:([A-Za-z0-9_.-]{1,255})|\[([0-9A-Fa-f:.]{2,45})\])(?::[0-9]{1,5})?")
+_TEXT = "text/plain; charset=utf-8"
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -47,32 +52,40 @@ class Site:
 
     def answer(self, request: Request) -> Response | None:
         """The file or the refusal; None lets a WebSocket in."""
-        address = urllib.parse.urlsplit(request.path)
-        refusal = self._refusal(request.headers, address)
+        path, _, query = request.path.partition("?")
+        if not path.startswith("/"):  # the whole address, as for a proxy
+            return _response(HTTPStatus.BAD_REQUEST, b"expected a path that begins with /\n", _TEXT)
+        refusal = self._refusal(request.headers, path, query)
         if refusal is not None:
-            return _response(HTTPStatus.FORBIDDEN, refusal.encode(), "text/plain; charset=utf-8")
-        if address.path == SOCKET:
+            return _response(HTTPStatus.FORBIDDEN, refusal.encode(), _TEXT)
+        if path == SOCKET:
             return None
-        found = self.files.get(address.path)
+        found = self.files.get(path)
         if found is None:
-            return _response(HTTPStatus.NOT_FOUND, b"not found\n", "text/plain; charset=utf-8")
+            return _response(HTTPStatus.NOT_FOUND, b"not found\n", _TEXT)
         return _response(HTTPStatus.OK, *found)
 
-    def _refusal(self, headers: Headers, address: urllib.parse.SplitResult) -> str | None:
+    def _refusal(self, headers: Headers, path: str, query: str) -> str | None:
         """Why a request is not answered."""
-        host = (headers.get_all("Host") or [""])[0]
-        name = urllib.parse.urlsplit(f"//{host}").hostname or ""
-        if self.token is None and not is_loopback(name):
+        hosts = headers.get_all("Host")
+        name = host_name(hosts[0]) if len(hosts) == 1 else None
+        if name is None or (self.token is None and not is_loopback(name)):
             # a name of another site that was made to point here
             return "Host: expected localhost or 127.0.0.1\n"
         origins = headers.get_all("Origin")
-        if any(origin not in (f"http://{host}", f"https://{host}") for origin in origins):
+        if any(origin not in (f"http://{hosts[0]}", f"https://{hosts[0]}") for origin in origins):
             return "Origin: the editor answers its own page only\n"
-        if self.token is not None and address.path in ("/", SOCKET):
-            said = urllib.parse.parse_qs(address.query).get("token", [""])[0]
-            if not hmac.compare_digest(said.encode(), self.token.encode()):
+        if self.token is not None and path in ("/", SOCKET):
+            said = urllib.parse.parse_qs(query, errors="replace").get("token", [""])[0]
+            if not hmac.compare_digest(said.encode(errors="replace"), self.token.encode()):
                 return "token: open the address that getup-edit printed\n"
         return None
+
+
+def host_name(host: str) -> str | None:
+    """The name or address in a Host header, in lower case; None where it is not a plain one."""
+    match = _HOST.fullmatch(host)
+    return None if match is None else (match[1] or match[2]).lower()
 
 
 def _response(status: HTTPStatus, body: bytes, kind: str) -> Response:

@@ -6,23 +6,22 @@ character's shape and this package's motion code. So a stale clip is never read.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import json
-import pickle
-import subprocess
-import sys
-import zipfile
-import zlib
+import uuid
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
-from getup_jax.motion import readers
+from getup_jax.motion.apart import run_apart
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.retarget import RetargetReport, RetargetSettings, retarget
+from getup_jax.motion.job import Job, Result, run_here
+from getup_jax.motion.npz import read_arrays
+from getup_jax.motion.retarget import RetargetReport
 from getup_jax.motion.text import read_bytes
 from getup_jax.paths import cache_dir
 from getup_jax.physics.character import CharacterSpec
@@ -33,40 +32,27 @@ _CODE = (
     *("calibrate", "composite_json", "deepmimic", "identify", "jacobian", "names", "prefixes"),
     *("readers", "retarget", "skeleton", "solver", "targets", "text", "upright"),
 )
+_MOST = 1e4  # m, rad or Hz
 _SHAPE = (
     *("body_parentid", "body_pos", "body_quat", "geom_bodyid", "geom_type", "geom_size"),
     *("geom_pos", "geom_quat", "jnt_type", "jnt_bodyid", "jnt_axis", "jnt_pos", "jnt_range"),
 )
 
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Job:
-    """What a worker needs to retarget one file."""
-
-    path: Path
-    character: CharacterSpec
-    read: readers.ReadOptions
-    settings: RetargetSettings
-
-
-Result = tuple[Clip, RetargetReport] | MotionError
+Run = Callable[[Job], tuple[Clip, RetargetReport]]
 
 
 def retarget_files(
-    jobs: Sequence[Job],
-    workers: int,
-    done: Callable[[Path], None] = lambda path: None,
-    apart: bool = False,
+    jobs: Sequence[Job], workers: int, done: Callable[[Path], None] = lambda path: None
 ) -> list[Result]:
     """One result a job, in order; a file that fails gives its error and stops no other.
 
-    apart: in a process of its own also where there is but one, so that this one stays quick.
+    Several are retargeted side by side, each in a process of its own.
     """
-    run = run_here if len(jobs) == 1 and not apart else _run_worker
+    run = run_here if len(jobs) == 1 else run_apart
 
     def one(job: Job) -> Result:
         try:
-            result: Result = load(job) or store(job, run(job))
+            result: Result = kept(job, run)
         except MotionError as error:
             result = error
         done(job.path)
@@ -74,6 +60,11 @@ def retarget_files(
 
     with ThreadPoolExecutor(max(1, workers)) as pool:
         return list(pool.map(one, jobs))
+
+
+def kept(job: Job, run: Run) -> tuple[Clip, RetargetReport]:
+    """The kept clip, or the one that `run` makes now, which is then kept."""
+    return load(job) or store(job, run(job))
 
 
 def key(job: Job) -> str:
@@ -105,12 +96,15 @@ def load(job: Job) -> tuple[Clip, RetargetReport] | None:
 
 
 def store(job: Job, result: tuple[Clip, RetargetReport]) -> tuple[Clip, RetargetReport]:
-    """Keep a clip; the same result comes back."""
+    """Keep a clip, where the disk can; the same result comes back."""
     file = _file(job)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    part = file.with_suffix(".part.npz")
-    write_npz(part, *result, job.character)
-    part.replace(file)
+    part = file.with_name(f"{uuid.uuid4().hex}.part.npz")  # others may make the same one
+    with contextlib.suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_npz(part, *result, job.character)
+        part.replace(file)
+    with contextlib.suppress(OSError):
+        part.unlink(missing_ok=True)
     return result
 
 
@@ -128,58 +122,52 @@ def write_npz(file: Path, clip: Clip, report: RetargetReport, character: Charact
 
 
 def read_npz(file: Path, character: CharacterSpec) -> tuple[Clip, RetargetReport]:
-    """A clip that `write_npz` made for the same character."""
-    try:
-        with np.load(file) as data:
-            values = {name: data[name] for name in data.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise MotionError(f"{file}: not a clip: {error}") from None
-    needed = {"qpos", "fps", "name", "source", "joints", "report"}
-    if not needed <= values.keys():
-        raise MotionError(f"{file}: expected {sorted(needed)}, got {sorted(values)}; import again")
-    joints = tuple(str(name) for name in values["joints"])
+    """A clip that `write_npz` made for the same character; MotionError says why it is none."""
+    values = read_arrays(file, ("qpos", "fps", "name", "source", "joints", "report"))
+    joints = tuple(str(name) for name in values["joints"].ravel())
     if joints != character.joint_names:
         raise MotionError(
             f"{file}: made for a character with {len(joints)} other joints, expected "
             f"{len(character.joint_names)}; import its source again for this character"
         )
-    report = json.loads(str(values["report"]))
-    for name in ("unknown_joints", "warnings"):
-        report[name] = tuple(report[name])
-    clip = Clip(
-        str(values["name"]),
-        float(values["fps"]),
-        values["qpos"].astype(np.float64),
-        str(values["source"]),
-    )
-    return clip, RetargetReport(**report)
+    qpos, fps = values["qpos"], values["fps"]
+    _check_motion(file, qpos, fps, character)
+    clip = Clip(str(values["name"]), float(fps), qpos.astype(np.float64), str(values["source"]))
+    return clip, _report(file, str(values["report"]))
 
 
-def run_here(job: Job) -> tuple[Clip, RetargetReport]:
-    """Read and retarget in this process."""
-    return retarget(readers.read_motion(job.path, job.read), job.character, job.settings)
+def _check_motion(file: Path, qpos: np.ndarray, fps: np.ndarray, character: CharacterSpec) -> None:
+    """Raise MotionError unless the arrays are a motion of the character."""
+    columns = 7 + character.num_joints
+    if qpos.dtype.kind != "f" or qpos.ndim != 2 or qpos.shape[1] != columns or len(qpos) < 2:
+        raise MotionError(
+            f"{file}: qpos: expected at least 2 rows of {columns} numbers, got {qpos.shape} of "
+            f"{qpos.dtype}; import again"
+        )
+    with np.errstate(over="ignore", invalid="ignore"):
+        norm = np.linalg.norm(qpos[:, 3:7], axis=1)
+    good = (np.abs(qpos) < _MOST).all(axis=1) & (np.abs(norm - 1.0) < 0.1)
+    if not good.all():
+        raise MotionError(
+            f"{file}: qpos: row {np.argmin(good)}: expected finite numbers and a unit quaternion; "
+            "import again"
+        )
+    if fps.shape or fps.dtype.kind not in "fiu" or not 0.0 < float(fps) < _MOST:
+        raise MotionError(f"{file}: fps: expected a rate above 0; import again")
 
 
-def _run_worker(job: Job) -> tuple[Clip, RetargetReport]:
-    """Retarget in a process of its own, so that files run side by side.
-
-    A plain command is safe where JAX runs already and in scripts without a main guard, which
-    neither fork nor spawn of multiprocessing are.
-    """
-    # -P: no module comes from the current folder, which is where people keep their motions
-    command = [sys.executable, "-P", "-m", "getup_jax.motion.worker"]
-    process = subprocess.run(command, input=pickle.dumps(job), capture_output=True, check=False)
-    if process.returncode:
-        text = process.stderr.decode(errors="replace").strip()
-        raise RuntimeError(f"{job.path}: retargeting stopped with an error:\n{text}")
-    result = pickle.loads(process.stdout)
-    if isinstance(result, MotionError):
-        raise result
-    return result
+def _report(file: Path, text: str) -> RetargetReport:
+    try:
+        report = json.loads(text)
+        for name in ("unknown_joints", "warnings"):
+            report[name] = tuple(report[name])
+        return RetargetReport(**report)
+    except (ValueError, TypeError, LookupError, RecursionError):
+        raise MotionError(f"{file}: report: expected that of an import; import again") from None
 
 
 def _file(job: Job) -> Path:
-    return cache_dir() / "clips" / f"{job.path.stem}-{key(job)}.npz"
+    return cache_dir() / "clips" / f"{job.path.stem[:40]}-{key(job)}.npz"
 
 
 def _companions(path: Path) -> Iterator[Path]:

@@ -15,7 +15,6 @@ Configs (`motion.source`), `getup-eval --curves` and the curve editor take the s
 from __future__ import annotations
 
 import dataclasses
-import math
 import re
 import reprlib
 from collections.abc import Mapping, Sequence
@@ -25,10 +24,12 @@ from typing import Any
 import numpy as np
 import yaml
 
+from getup_jax import yaml_text
 from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.curves import NUM_POINTS
 from getup_jax.motion.features import NAMES
 from getup_jax.physics.character import CharacterSpec
+from getup_jax.yaml_text import YamlError
 
 SUFFIXES = (".yaml", ".yml")
 MIRRORED = "mirrored "  # before the name of a reference motion: its mirror image
@@ -38,7 +39,6 @@ DURATION_S = (0.5, 20.0)
 # points past what a body can do bend it towards there.
 LIMITS = ((-0.5, 2.5), (-90.0, 270.0), (-90.0, 270.0))
 _MAX_BYTES = 64_000
-_MOST_LISTS = 50  # in a file, comments included
 _MAX_DURATIONS = 16
 _NAME = re.compile(r"[\w.@:~ -]{1,80}")
 _SHORT = reprlib.Repr()  # of what came instead
@@ -116,22 +116,19 @@ def parse_text(text: str | bytes, where: str) -> CurveFile:
     if isinstance(text, bytes):
         text = text.decode("utf-8", "replace")
     try:
-        # a deep nest takes the parser long
-        content = yaml.safe_load(text) if text.count("[") <= _MOST_LISTS else None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        line = getattr(getattr(error, "problem_mark", None), "line", None)
-        place = "" if line is None else f", line {line + 1}"
-        raise MotionError(f"{where}{place}: not a curve file: expected YAML text") from None
+        content = yaml_text.parse(text)
+    except YamlError as error:
+        place = "" if error.line is None else f", line {error.line}"
+        raise MotionError(f"{where}{place}: not a curve file: {error}") from None
     return parse(content, where)
 
 
 def parse(content: Any, where: str) -> CurveFile:
     """The style in the content of a file, however it came; every value is checked."""
     if not isinstance(content, Mapping) or set(content) - {"pose"} != set(KEYS):
-        found = (
-            ", ".join(str(key)[:40] for key in content) if isinstance(content, Mapping) else content
-        )
-        raise MotionError(f"{where}: expected the keys {', '.join(KEYS)}, got {_SHORT.repr(found)}")
+        mapping = isinstance(content, Mapping)
+        found = ", ".join(_shown(k).strip("'") for k in content) if mapping else content
+        raise MotionError(f"{where}: expected the keys {', '.join(KEYS)}, got {_shown(found)}")
     for key in ("name", "strategy", "start"):
         if not isinstance(content[key], str) or not _NAME.fullmatch(content[key]):
             raise _wrong(where, key, "up to 80 letters, digits, spaces and _-.@:~", content[key])
@@ -185,14 +182,22 @@ def _numbers(content: Any, where: str, key: str, limits: tuple[float, float]) ->
     numbers: list[float] = []
     for value in content:
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not math.isfinite(value) or not low <= value <= high:
+        if not number or not low <= value <= high:  # which NaN is not, and integers of any size
             raise _wrong(where, key, expected, value)
         numbers.append(float(value))
     return numbers
 
 
 def _wrong(where: str, key: str, expected: str, got: Any) -> MotionError:
-    return MotionError(f"{where}: {key}: expected {expected}, got {_SHORT.repr(got)}")
+    return MotionError(f"{where}: {key}: expected {expected}, got {_shown(got)}")
+
+
+def _shown(value: Any) -> str:
+    """A value in a few characters; Python writes no integer of thousands of digits."""
+    try:
+        return _SHORT.repr(value)
+    except ValueError:
+        return "a number of thousands of digits"
 
 
 def _unknown_start(name: str, start: str, known: Sequence[str]) -> MotionError:

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from getup_jax.motion.bvh import Y_UP
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.skeleton import Recording, at_times, turned
+from getup_jax.motion.skeleton import Recording, at_times, even_times, turned
 from getup_jax.motion.text import LARGEST, read_json
 
 COLUMNS = 44
@@ -118,8 +118,7 @@ def _even(recording: Recording, durations: np.ndarray) -> Recording:
         return recording
     times = np.concatenate([[0.0], np.cumsum(durations[:-1])])
     fps = 1.0 / float(np.median(durations[:-1]))
-    new = np.arange(int(times[-1] * fps + 1e-6) + 1) / fps
-    return at_times(recording, times, new, fps)
+    return at_times(recording, times, even_times(recording.name, float(times[-1]), fps), fps)
 
 
 def _about_z(angle: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from getup_jax.motion import asf_amc, bvh, composite_json, deepmimic
 from getup_jax.motion.clips import MotionError
+from getup_jax.motion.guard import one_line
 from getup_jax.motion.skeleton import Recording
 from getup_jax.motion.text import decode, read_json
 
@@ -23,11 +24,19 @@ class ReadOptions:
 
 
 def read_motion(path: str | Path, options: ReadOptions = ReadOptions()) -> Recording:
-    """The recording in a file, Z up, lengths in the file's own unit."""
+    """The recording in a file, Z up, lengths in the file's own unit.
+
+    Whatever is wrong with the file is a MotionError.
+    """
     path = Path(path)
-    suffix = path.suffix.lower()
     if not path.is_file():
         raise MotionError(f"{path}: no such file")
+    with one_line(path.name):
+        return _read(path, options)
+
+
+def _read(path: Path, options: ReadOptions) -> Recording:
+    suffix = path.suffix.lower()
     if suffix == ".bvh":
         how = bvh.BvhOptions(up=options.up, allow_short=options.allow_short, fps=options.fps)
         return bvh.read_bvh(path, how)

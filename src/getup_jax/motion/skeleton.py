@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from getup_jax.motion.clips import MotionError
 
+_MOST_FRAMES = 1_000_000  # nine hours at 30 Hz
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Recording:
@@ -122,8 +124,17 @@ def resampled(recording: Recording, fps: float) -> Recording:
     if recording.num_frames < 2 or abs(recording.fps - fps) < 1e-3 * fps:
         return dataclasses.replace(recording, fps=fps) if recording.num_frames else recording
     old = np.arange(recording.num_frames) / recording.fps
-    new = np.arange(int(old[-1] * fps + 1e-6) + 1) / fps
-    return at_times(recording, old, new, fps)
+    return at_times(recording, old, even_times(recording.name, float(old[-1]), fps), fps)
+
+
+def even_times(name: str, seconds: float, fps: float) -> np.ndarray:
+    """Times (s) of the frames of a recording at a rate; MotionError where there are too many."""
+    if not 0.0 <= seconds * fps < _MOST_FRAMES:
+        raise MotionError(
+            f"{name}: expected less than {_MOST_FRAMES} frames at {fps:g} Hz, got "
+            f"{seconds:g} s; correct the rate or the durations in the file"
+        )
+    return np.arange(int(seconds * fps + 1e-6) + 1) / fps
 
 
 def at_times(recording: Recording, old: np.ndarray, new: np.ndarray, fps: float) -> Recording:
