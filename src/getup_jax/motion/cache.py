@@ -22,6 +22,7 @@ import numpy as np
 
 from getup_jax.motion import readers
 from getup_jax.motion.clips import Clip, MotionError
+from getup_jax.motion.names import listed
 from getup_jax.motion.retarget import RetargetReport, RetargetSettings, retarget
 from getup_jax.motion.text import read_bytes
 from getup_jax.paths import cache_dir
@@ -140,8 +141,8 @@ def read_npz(file: Path, character: CharacterSpec) -> tuple[Clip, RetargetReport
     joints = tuple(str(name) for name in values["joints"])
     if joints != character.joint_names:
         raise MotionError(
-            f"{file}: made for a character with {len(joints)} other joints, expected "
-            f"{len(character.joint_names)}; import its source again for this character"
+            f"{file}: made for another character: {_difference(joints, character.joint_names)}; "
+            "import its source again for this character"
         )
     report = json.loads(str(values["report"]))
     for name in ("unknown_joints", "warnings"):
@@ -153,6 +154,19 @@ def read_npz(file: Path, character: CharacterSpec) -> tuple[Clip, RetargetReport
         str(values["source"]),
     )
     return clip, RetargetReport(**report)
+
+
+def _difference(theirs: Sequence[str], ours: Sequence[str]) -> str:
+    """In what the joints of two characters differ."""
+    lacks = [name for name in ours if name not in theirs]
+    more = [name for name in theirs if name not in ours]
+    texts = [f"lacks joint {listed(lacks)}"] if lacks else []
+    texts += [f"has joint {listed(more)}, which this one has not"] if more else []
+    if texts:
+        return ", ".join(texts)
+    pairs = zip(theirs, ours, strict=False)
+    one, other = next((pair for pair in pairs if pair[0] != pair[1]), (theirs[-1], ours[-1]))
+    return f"its joints have another order, {one} where this one has {other}"
 
 
 def run_here(job: Job) -> tuple[Clip, RetargetReport]:
