@@ -6,15 +6,17 @@ import argparse
 import dataclasses
 import itertools
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from getup_jax.config import Config, ConfigError
+from getup_jax.config import Config, ConfigError, MotionConfig
 from getup_jax.motion import events
 from getup_jax.motion.clips import Clip, GetUp
 from getup_jax.motion.curve_file import CurveFile
 from getup_jax.motion.library import load_motions
+from getup_jax.motion.readers import SUFFIXES
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.settings import load_config
 from getup_jax.tasks.episode import LYING, STANDING
@@ -42,7 +44,7 @@ class Conditions:
     edits: int = 0  # variants of each curve, run beside the episodes for the control gain
     seed: int = 0
     curves: tuple[str, ...] = ()  # curve files in place of the trained styles
-    motions: str | None = None  # a config whose motions are there in place of the trained styles
+    motions: str | None = None  # a config or motion file in place of the trained styles
     drops: str | None = (
         None  # how bodies came to lie, see DROPPED; None: as in training without limp_share
     )
@@ -178,8 +180,10 @@ def drawn(
 
 
 def of_config(path: str, getups: Sequence[GetUp], character: CharacterSpec) -> tuple[GetUp, ...]:
-    """The get-ups of a config's `motion` section, in place of `getups`."""
-    found = load_motions(load_config(path).motion, character).getups
+    """The get-ups of a config's `motion` section, or of a motion file, in place of `getups`."""
+    is_motion = Path(path).suffix.lower() in (*SUFFIXES, ".npz")
+    motion = MotionConfig(source=(path,)) if is_motion else load_config(path).motion
+    found = load_motions(motion, character).getups
     if not found:
         raise ConfigError(f"--motions {path}: motion.source: no get-ups found")
     return found

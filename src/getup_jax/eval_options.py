@@ -111,9 +111,9 @@ def _add_conditions(group: argparse._ArgumentGroup) -> None:
     styles.add_argument(
         "--motions",
         type=Path,
-        metavar="CONFIG",
-        help="the get-ups that the `motion` section of another config names, in place of the "
-        "trained ones",
+        metavar="CONFIG|FILE",
+        help="the get-ups that the `motion` section of another config names, or those in a motion "
+        "file, in place of the trained ones",
     )
     styles.add_argument(
         "--blend",

@@ -35,6 +35,7 @@ from getup_jax.grounds import Places
 from getup_jax.motion.clips import GetUp
 from getup_jax.motion.curve_file import read_curve_file
 from getup_jax.nets import prior as pose_prior
+from getup_jax.physics.body_digest import body_digest, warn_if_other
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain_map import REGIONS
 from getup_jax.progress import Display
@@ -94,6 +95,8 @@ def evaluate(
     """Run and score the episodes; `config` is that of `evaluation_config`."""
     prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
     task = build_task(config, display.log, prior, chosen_styles(config, conditions))
+    body = body_digest(task.environment.character.model)
+    warn_if_other(loaded.path, loaded.metadata, body, display.log)
     learner, policy = restore_policy(config, loaded, task)
     *_, num_styles, rows = task.world.pool.table.shape
     plan = make_plan(conditions, number, num_styles, rows)

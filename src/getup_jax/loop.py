@@ -16,6 +16,8 @@ from getup_jax.algo.state import owned
 from getup_jax.config import Config
 from getup_jax.journal import Journal
 from getup_jax.metrics import MetricsWriter
+from getup_jax.physics import body_digest
+from getup_jax.physics.body_digest import warn_if_other
 from getup_jax.progress import Display, count, duration
 from getup_jax.stop import StopRequest
 from getup_jax.storage import CheckpointError, from_nested, is_finite, to_nested
@@ -42,6 +44,7 @@ class Job:
     share: Callable[[Any, Any, str], Any] | None = None
     # (a fresh policy, log) -> what training begins with; None: the fresh one
     prepare: Callable[[Any, Log], Any] | None = None
+    body: dict[str, str] | None = None  # digest of the character, see physics/body_digest.py
 
 
 def steps_per_iteration(config: Config) -> int:
@@ -99,12 +102,14 @@ class Loop:
         self._state, self.saved = restored.state, restored.path
         self.done = int(restored.metadata["iteration"])
         self._display.log(f"resuming from {restored.path} at {count(self.steps)} steps")
+        warn_if_other(restored.path, restored.metadata, self._job.body, self._display.log)
 
     def _load_policy(self, path: str) -> None:
         loaded = checkpoint.load_policy(path)
         learner = self._state.learner
         policy = from_nested(learner.policy, loaded.policy, str(loaded.path))
         self._display.log(f"starting with the policy of {loaded.path}")
+        warn_if_other(loaded.path, loaded.metadata, self._job.body, self._display.log)
         if self._config.train.init_learner:
             self._load_learner(path)
             policy = self._state.learner.policy  # not the average of its weights
@@ -172,7 +177,9 @@ class Loop:
         item = to_nested({**parts, "prior": self._job.prior})
         if not is_finite(item):
             raise self._error("a weight of the policy is not a finite number")
-        metadata = {"steps": self.steps}
+        metadata: dict[str, Any] = {"steps": self.steps}
+        if self._job.body is not None:
+            metadata[body_digest.KEY] = self._job.body
         self.saved = checkpoint.save_learner(
             self._checkpoints, self.done, self._state, self._config, item, metadata
         )

@@ -22,6 +22,7 @@ from getup_jax.config import Config
 from getup_jax.footing import teach_footing
 from getup_jax.loop import CarryOver, Job, Loop, TrainingError, num_iterations, steps_per_iteration
 from getup_jax.metrics import MetricsWriter, tensorboard_module
+from getup_jax.physics.body_digest import body_digest
 from getup_jax.progress import Display, count, duration
 from getup_jax.rehearsal import Stage, rehearse
 from getup_jax.runfolder import prepare, resume_command
@@ -55,7 +56,8 @@ def build_job(config: Config, log: Log) -> Job:
         objectives=objectives,
     )
     carry_over = _carry_over(learner, task.world, config)
-    return Job(learner, task.world, task.prior, carry_over, share=with_shared)
+    body = body_digest(task.environment.character.model)
+    return Job(learner, task.world, task.prior, carry_over, share=with_shared, body=body)
 
 
 def _carry_over(learner: Learner, world: World, config: Config) -> CarryOver:
@@ -89,7 +91,8 @@ def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Job]:
     prepare = None
     if composite.rehearse:
         prepare = functools.partial(_rehearse, learner, built, world, config.seed)
-    return built, Job(learner=learner, world=world, prior=None, prepare=prepare)
+    body = body_digest(built.environment.character.model)
+    return built, Job(learner=learner, world=world, prior=None, prepare=prepare, body=body)
 
 
 def _rehearse(

@@ -261,9 +261,3 @@ def written(tmp_path, root="<freejoint/>", joint="hinge", actuator=ACTUATOR, key
 def test_a_character_of_another_form_is_an_error(tmp_path, change, message):
     with pytest.raises(ConfigError, match=message):
         load_character(written(tmp_path, **change))
-
-
-def test_any_character_of_the_right_form_loads(tmp_path):
-    character = load_character(written(tmp_path))
-    assert character.link_names == ("pelvis", "link")
-    assert character.joint_names == ("bend",)

@@ -12,6 +12,7 @@ import numpy as np
 from getup_jax.algo.meta import MetaTask
 from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.config import Config
+from getup_jax.physics.body_digest import warn_if_other
 from getup_jax.storage import from_nested
 from getup_jax.tasks.build_composite import BuiltComposite
 from getup_jax.tasks.composite import CompositeTask
@@ -59,6 +60,7 @@ class Restored:
 def restore(config: Config, loaded: LoadedPolicy, log: Log) -> Restored:
     """The task of a config, and the loaded policy in it."""
     built, job = build_composite_job(config, log)
+    warn_if_other(loaded.path, loaded.metadata, job.body, log)
     return Restored(built, job, policy_in(job, loaded))
 
 

@@ -23,6 +23,7 @@ from getup_jax.motion.clips import GetUp
 from getup_jax.motion.curve_file import CurveFile
 from getup_jax.naturalness import FootPoints
 from getup_jax.nets import prior as pose_prior
+from getup_jax.physics.body_digest import body_digest, warn_if_other
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.scores import episode_values
 from getup_jax.tasks.build import BuiltTask, build_task
@@ -76,7 +77,10 @@ class Simulator:
         """Load the motions and make the start states of a checkpoint's own ground."""
         config = editor_config(loaded.config)
         prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
-        return cls.of(config, build_task(config, log, prior, _with_clips), loaded)
+        task = build_task(config, log, prior, _with_clips)
+        body = body_digest(task.environment.character.model)
+        warn_if_other(loaded.path, loaded.metadata, body, log)
+        return cls.of(config, task, loaded)
 
     @classmethod
     def of(cls, config: Config, task: BuiltTask, loaded: LoadedPolicy) -> Simulator:

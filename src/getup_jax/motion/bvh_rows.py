@@ -45,17 +45,17 @@ def read_timing(file: str, lines: Sequence[str], start: int, fps: float | None) 
     if "Frames" not in found:
         raise MotionError(f"{file}, after line {start}: expected 'Frames:' and their number")
     at, text = found["Frames"]
-    frames = number_of(file, at, "Frames", text)
-    if frames < 0 or frames != int(frames):
-        raise MotionError(f"{file}, line {at}: expected a whole frame count, got {frames:g}")
+    if not re.fullmatch(r"\d{1,15}(\.0*)?", text):
+        raise MotionError(f"{file}, line {at}: Frames: expected a whole number, got {said(text)}")
+    frames = int(float(text))
     if fps is not None:
-        return Timing(int(frames), 1.0 / fps, last)
+        return Timing(frames, 1.0 / fps, last)
     if "Frame Time" not in found:
         raise MotionError(
             f"{file}, after line {start}: expected 'Frame Time:' and seconds; write it, or give "
             "the file's rate with --source-fps"
         )
-    return Timing(int(frames), _seconds(file, *found["Frame Time"]), last)
+    return Timing(frames, _seconds(file, *found["Frame Time"]), last)
 
 
 def read_rows(
@@ -125,8 +125,8 @@ def _without_tail(rows: list[Row], frames: int) -> tuple[list[Row], list[str]]:
     """The rows up to a word that is no number behind the last frame."""
     for index, row in enumerate(rows[frames:], frames):
         if not _NUMBER.match(row.text.lstrip()):
-            text = f"line {row.line}: not read from {said(row.text.strip())} on"
-            return rows[:index], [f"{text}, which is behind the last row"]
+            text = f"line {row.line}: {said(row.text.strip())} is behind the last row"
+            return rows[:index], [f"{text}, and not read, nor what follows"]
     return rows, []
 
 
@@ -144,6 +144,8 @@ def _fast(rows: Sequence[Row], width: int) -> np.ndarray | None:
 def _wrapped(rows: Sequence[Row], width: int) -> np.ndarray | None:
     """The values of frames that take several lines each, or share one; None for all others."""
     words = [row.text.split() for row in rows]
+    if any("_" in row.text for row in rows):  # Python reads 1_0 as 10
+        return None
     lengths = np.array([len(line) for line in words], int)
     ends = np.cumsum(lengths)
     if not rows or ends[-1] % width:

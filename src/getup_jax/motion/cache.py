@@ -20,6 +20,7 @@ import numpy as np
 from getup_jax.motion.apart import run_apart
 from getup_jax.motion.clips import Clip, MotionError
 from getup_jax.motion.job import Job, Result, run_here
+from getup_jax.motion.names import listed
 from getup_jax.motion.npz import read_arrays
 from getup_jax.motion.retarget import RetargetReport
 from getup_jax.motion.text import read_bytes
@@ -127,8 +128,8 @@ def read_npz(file: Path, character: CharacterSpec) -> tuple[Clip, RetargetReport
     joints = tuple(str(name) for name in values["joints"].ravel())
     if joints != character.joint_names:
         raise MotionError(
-            f"{file}: made for a character with {len(joints)} other joints, expected "
-            f"{len(character.joint_names)}; import its source again for this character"
+            f"{file}: made for another character: {_difference(joints, character.joint_names)}; "
+            "import its source again for this character"
         )
     qpos, fps = values["qpos"], values["fps"]
     _check_motion(file, qpos, fps, character)
@@ -154,6 +155,19 @@ def _check_motion(file: Path, qpos: np.ndarray, fps: np.ndarray, character: Char
         )
     if fps.shape or fps.dtype.kind not in "fiu" or not 0.0 < float(fps) < _MOST:
         raise MotionError(f"{file}: fps: expected a rate above 0; import again")
+
+
+def _difference(theirs: Sequence[str], ours: Sequence[str]) -> str:
+    """In what the joints of two characters differ."""
+    lacks = [name for name in ours if name not in theirs]
+    more = [name for name in theirs if name not in ours]
+    texts = [f"lacks joint {listed(lacks)}"] if lacks else []
+    texts += [f"has joint {listed(more)}, which this one has not"] if more else []
+    if texts:
+        return ", ".join(texts)
+    pairs = zip(theirs, ours, strict=False)
+    one, other = next((pair for pair in pairs if pair[0] != pair[1]), (theirs[-1], ours[-1]))
+    return f"its joints have another order, {one} where this one has {other}"
 
 
 def _report(file: Path, text: str) -> RetargetReport:

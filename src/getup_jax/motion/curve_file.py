@@ -39,6 +39,7 @@ DURATION_S = (0.5, 20.0)
 # points past what a body can do bend it towards there.
 LIMITS = ((-0.5, 2.5), (-90.0, 270.0), (-90.0, 270.0))
 _MAX_BYTES = 64_000
+_MOTIONS, _EITHER = (".bvh", ".amc", ".asf", ".npz"), (".json", ".txt")
 _MAX_DURATIONS = 16
 _NAME = re.compile(r"[\w.@:~ -]{1,80}")
 _SHORT = reprlib.Repr()  # of what came instead
@@ -102,7 +103,14 @@ def read_curve_file(path: str | Path) -> CurveFile:
     """The style in a file; MotionError says what is wrong with it."""
     path = Path(path)
     try:
-        if path.stat().st_size > _MAX_BYTES:
+        large = path.stat().st_size > _MAX_BYTES
+        if path.suffix.lower() in _MOTIONS or (large and path.suffix.lower() in _EITHER):
+            raise MotionError(
+                f"{path.name}: expected a curve file ({', '.join(SUFFIXES)}), got a motion file; "
+                f"evaluate its get-ups with --motions {path}, or import it in getup-edit and save "
+                "its curve"
+            )
+        if large:
             raise MotionError(f"{path.name}: expected at most {_MAX_BYTES} bytes")
         return parse_text(path.read_bytes(), path.name)
     except OSError as error:

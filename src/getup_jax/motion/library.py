@@ -111,7 +111,9 @@ def _clips(
     """Every file's clip; short files are taken, as their warning says."""
     read = ReadOptions(allow_short=True)
     jobs = [
-        Job(file, character, read, RetargetSettings()) for file in files if file.suffix != ".npz"
+        Job(file, character, read, RetargetSettings())
+        for file in files
+        if file.suffix.lower() != ".npz"
     ]
     fresh = dict(zip([job.path for job in jobs], retarget_files(jobs, cpus(), done), strict=True))
     clips, report = [], {}

@@ -32,7 +32,7 @@ def _named(name: str, character: CharacterSpec, key: str) -> Clip:
     try:
         if authored.is_file():
             return clip_from_keyframes(read_keyframes(authored, character), character)
-        if path.suffix == ".npz" and path.is_file():
+        if path.suffix.lower() == ".npz" and path.is_file():
             return read_npz(path, character)[0]
         if path.is_file():
             job = Job(path, character, ReadOptions(allow_short=True), RetargetSettings())

@@ -13,9 +13,11 @@ import numpy as np
 from getup_jax.config import ConfigError, PhysicsConfig
 from getup_jax.paths import asset_path
 from getup_jax.physics.props import Equipment, add_balls, add_racket
+from getup_jax.physics.requirements import check_character, hinges_of
 from getup_jax.physics.terrain_map import TerrainMap
 from getup_jax.physics.terrain_model import FLOOR, replace_floor
 
+_REFUSALS = (ValueError, mujoco.FatalError)  # of files that MuJoCo does not take
 _SOLVERS = {
     "auto": mujoco.mjtSolver.mjSOL_PGS,  # the MJX engine, which has none, takes Newton
     "newton": mujoco.mjtSolver.mjSOL_NEWTON,
@@ -84,22 +86,22 @@ def load_character(
     """Read the MJCF file that the config names and apply the config's physics settings.
 
     The character stands on its file's floor, a plane, or on the given ground in place of it,
-    with the given equipment.
+    with the given equipment. Raises ConfigError where the file lacks what docs/character.md lists.
     """
-    spec = mujoco.MjSpec.from_file(str(character_file(config.character)))
+    spec = _read(config.character)
     if ground is not None:
         replace_floor(spec, ground)
     balls = equipment.balls if equipment else ()
     if equipment and equipment.racket:
         add_racket(spec)
     model = scene = _compile(spec, config)
+    check_character(model, config.character)
     if balls:
         add_balls(spec, balls, FLOOR)
         scene = _compile(spec, config)
     bodies = [model.body(i).name for i in range(1, model.nbody)]
-    hinges = [i for i in range(model.njnt) if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE]
+    hinges = hinges_of(model)
     names = tuple(model.joint(i).name for i in hinges)
-    _check_layout(model, hinges, config.character)
     mirror_joint, mirror_sign = _mirror_table(names)
     return CharacterSpec(
         model=model,
@@ -127,11 +129,28 @@ def character_file(name: str) -> Path:
     return path
 
 
+def _read(name: str) -> mujoco.MjSpec:
+    file = character_file(name)
+    try:
+        return mujoco.MjSpec.from_file(str(file))
+    except _REFUSALS as error:
+        raise _refused(name, error) from None
+
+
+def _refused(name: str, error: Exception) -> ConfigError:
+    """MuJoCo's reason in one line."""
+    text = " ".join(str(error).split())
+    return ConfigError(f"physics.character: {name}: not a valid MJCF file: {text}")
+
+
 def _compile(spec: mujoco.MjSpec, config: PhysicsConfig) -> mujoco.MjModel:
     spec.option.timestep = 1.0 / (config.control_hz * config.substeps)
     spec.option.solver = _SOLVERS[config.solver]
     spec.option.iterations = config.iterations
-    model = spec.compile()
+    try:
+        model = spec.compile()
+    except _REFUSALS as error:
+        raise _refused(config.character, error) from None
     hinges = slice(6, 6 + model.nu)
     model.dof_armature[hinges] = config.armature
     model.dof_damping[hinges] = config.damping
@@ -141,18 +160,6 @@ def _compile(spec: mujoco.MjSpec, config: PhysicsConfig) -> mujoco.MjModel:
     # the inverse weights that constraints use depend on the armature
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
-
-
-def _check_layout(model: mujoco.MjModel, hinges: list[int], name: str) -> None:
-    if model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE or len(hinges) != model.njnt - 1:
-        raise ConfigError(f"physics.character: {name}: expected one free root, then hinges only")
-    if model.actuator_trnid[:, 0].tolist() != hinges:
-        raise ConfigError(
-            f"physics.character: {name}: expected one actuator a hinge, in the hinges' order"
-        )
-    keys = [model.key(i).name for i in range(model.nkey)]
-    if "neutral" not in keys:
-        raise ConfigError(f"physics.character: {name}: no keyframe named 'neutral', has {keys}")
 
 
 def _head_sphere(model: mujoco.MjModel) -> tuple[int, tuple[float, float, float], float]:

@@ -12,7 +12,7 @@ FLOOR = "floor"  # the ground's geom, plane or height field
 _BASE_M = 1.0  # how far the solid ground reaches below its lowest point
 _VIEW_M = 3.0  # what cameras see reaches from a hundredth to fifty times as far
 _STUD_M = 0.01  # radius of the studs under the soles
-_GROUND_ONLY = 2  # collision bit that only the ground answers to
+GROUND_ONLY = 2  # collision bit that only the ground answers to
 
 
 def replace_floor(spec: mujoco.MjSpec, ground: TerrainMap) -> None:
@@ -34,7 +34,7 @@ def replace_floor(spec: mujoco.MjSpec, ground: TerrainMap) -> None:
         friction=plane.friction,
         condim=plane.condim,
         material=plane.material,
-        conaffinity=plane.conaffinity | _GROUND_ONLY,
+        conaffinity=plane.conaffinity | GROUND_ONLY,
     )
     spec.delete(plane)
     spec.geom("terrain").name = FLOOR
@@ -60,7 +60,7 @@ def _add_studs(spec: mujoco.MjSpec) -> None:
                         size=[_STUD_M, 0.0, 0.0],
                         pos=box.pos + corner * [x, y, -1],
                         mass=0.0,
-                        contype=_GROUND_ONLY,
+                        contype=GROUND_ONLY,
                         conaffinity=0,
                         condim=box.condim,
                         friction=box.friction,
