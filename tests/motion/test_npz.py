@@ -107,8 +107,8 @@ def test_what_is_declared_must_be_there(tmp_path, member):
             for fps in (0.0, -1.0, np.nan, np.inf, 1e300)
         ],
         *[({"fps": fps}, "fps: expected a rate above 0") for fps in ("30", [30.0], True)],
-        ({"joints": "knee"}, "made for a character with 1 other joints"),
-        ({"joints": []}, "made for a character with 0 other joints"),
+        ({"joints": "knee"}, "made for another character: lacks joint"),
+        ({"joints": []}, "made for another character: lacks joint"),
         *[
             ({"report": text}, "report: expected that of an import")
             for text in ("", "[]", "5", "{}")

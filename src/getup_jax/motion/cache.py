@@ -34,6 +34,7 @@ _CODE = (
     *("readers", "retarget", "skeleton", "solver", "targets", "text", "upright"),
 )
 _MOST = 1e4  # m, rad or Hz
+_FEW = 4  # joints that an error names
 _SHAPE = (
     *("body_parentid", "body_pos", "body_quat", "geom_bodyid", "geom_type", "geom_size"),
     *("geom_pos", "geom_quat", "jnt_type", "jnt_bodyid", "jnt_axis", "jnt_pos", "jnt_range"),
@@ -161,8 +162,8 @@ def _difference(theirs: Sequence[str], ours: Sequence[str]) -> str:
     """In what the joints of two characters differ."""
     lacks = [name for name in ours if name not in theirs]
     more = [name for name in theirs if name not in ours]
-    texts = [f"lacks joint {listed(lacks)}"] if lacks else []
-    texts += [f"has joint {listed(more)}, which this one has not"] if more else []
+    texts = [f"lacks joint {listed(lacks, _FEW)}"] if lacks else []
+    texts += [f"has joint {listed(more, _FEW)}, which this one has not"] if more else []
     if texts:
         return ", ".join(texts)
     pairs = zip(theirs, ours, strict=False)

@@ -100,10 +100,10 @@ def unknown_joints(joints: Sequence[str], found: Mapping[str, int]) -> list[str]
     return [name for i, name in enumerate(joints) if i not in used]
 
 
-def listed(names: Sequence[str]) -> str:
-    """The names with commas between them, not endlessly many."""
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return ", ".join(names[:_SHOWN]) + more
+def listed(names: Sequence[str], most: int = _SHOWN) -> str:
+    """The names with commas between them, `most` of them."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
 def read_map(path: str | Path) -> dict[str, str | None]:
