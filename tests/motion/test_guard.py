@@ -100,7 +100,7 @@ def test_frames_of_hugely_unequal_duration_are_refused(tmp_path):
     rows = [[seconds, *DEEPMIMIC[1:]] for seconds in (1e-3, 1e-3, 1e-3, 9e5, 1e-3)]
     file.write_text(json.dumps({"Frames": rows}))
     with pytest.raises(
-        MotionError, match="expected a duration above 0 s, from 0.0001 to 10 s, got 900000"
+        MotionError, match=r"expected a duration above 0 s, from 0\.0001 to 10 s, got 900000"
     ):
         read_motion(file)
     file.write_text(json.dumps({"Frames": [[1e-300, *DEEPMIMIC[1:]]] * 3}))
