@@ -10,13 +10,13 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from getup_jax.config import Config, ConfigError, TaskConfig, TerrainConfig
+from getup_jax.config import Config, ConfigError, MotionConfig, TaskConfig, TerrainConfig
 from getup_jax.motion.clips import GetUp
 from getup_jax.motion.getups import flat_time
 from getup_jax.motion.library import load_motions
 from getup_jax.nets.prior import PosePrior
 from getup_jax.nets.prior_cache import cached_prior
-from getup_jax.nets.prior_data import make_pose_set
+from getup_jax.nets.prior_data import PoseSet, make_pose_set
 from getup_jax.paths import asset_path, cache_dir
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.engine import make_engine
@@ -64,7 +64,7 @@ def build_task(
     if config.prior is None:
         log("no pose prior: the policy's actions are the servo targets")
     elif prior is None:
-        poses = make_pose_set(library.poses, character, mirrored=config.motion.mirror)
+        poses = _pose_set(library.poses, config.motion, character)
         prior, _ = cached_prior(
             poses, config.prior, cache_dir() / "prior", log, shipped=asset_path("priors")
         )
@@ -73,6 +73,17 @@ def build_task(
         log(f"motions: {len(getups)} styles made of them")
     say_which_lie(getups, config.task, log)
     return assemble(config, character, getups, prior, log)
+
+
+def _pose_set(poses: np.ndarray, motion: MotionConfig, character: CharacterSpec) -> PoseSet:
+    """The prior's data, of which some is held out."""
+    least = 4 if motion.mirror else 2
+    if len(poses) < least:
+        raise ConfigError(
+            f"motion.augment_poses: expected at least {least} poses for the pose prior, with those "
+            f"of motion.source, got {len(poses)}; raise it, add motions, or set prior: null"
+        )
+    return make_pose_set(poses, character, mirrored=motion.mirror)
 
 
 def say_which_lie(getups: Sequence[GetUp], config: TaskConfig, log: Callable[[str], None]) -> None:
