@@ -34,7 +34,7 @@ check: $(STAMP) ## lint, format and types
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
-bench: $(STAMP) ## every benchmark, one after the other
+bench: $(STAMP) ## every benchmark, one after the other; ARGS=--quick for the smallest sizes
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python "$$file" $(ARGS); done
 
 clean: ## remove what can be made again; runs/ stays

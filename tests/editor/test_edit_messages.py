@@ -212,6 +212,13 @@ def test_mutated_files_are_read_or_refused(session):
         assert said_of(session, pack(head, bytes(changed[:cut]))) is not None
 
 
+def test_a_failure_of_the_editor_is_named_to_the_page_and_said_on_the_terminal():
+    with pytest.warns(UserWarning, match="load: KeyError: 'height'"):
+        told = error_message(messages.Request("load", 3), KeyError("height"))
+    text = "the editor failed at this (KeyError); its terminal says more"
+    assert json.loads(told) == {"type": "error", "text": text, "number": 3, "of": "load"}
+
+
 def test_a_file_of_32_mb_is_the_largest():
     head = {"type": "import", "number": 1, "name": "a.bvh"}
     assert len(read(pack(head, bytes(messages.MAX_FILE_BYTES))).content) == 32_000_000

@@ -97,12 +97,7 @@ def test_no_value_in_a_json_motion_ends_in_pythons_words(tmp_path, name, value):
 
 def test_frames_of_hugely_unequal_duration_are_refused(tmp_path):
     file = tmp_path / "a.txt"
-    rows = [[seconds, *DEEPMIMIC[1:]] for seconds in (1e-3, 1e-3, 1e-3, 9e5, 1e-3)]
+    rows = [[seconds, *DEEPMIMIC[1:]] for seconds in [1e-4] * 12 + [10.0] * 12]
     file.write_text(json.dumps({"Frames": rows}))
-    with pytest.raises(
-        MotionError, match=r"expected a duration above 0 s, from 0\.0001 to 10 s, got 900000"
-    ):
-        read_motion(file)
-    file.write_text(json.dumps({"Frames": [[1e-300, *DEEPMIMIC[1:]]] * 3}))
-    with pytest.raises(MotionError, match="frame 0: expected a duration above 0"):
+    with pytest.raises(MotionError, match="expected less than 1000000 frames at 10000 Hz, got 110"):
         read_motion(file)

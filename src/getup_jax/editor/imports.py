@@ -80,7 +80,7 @@ def _check_unpacked(name: str, content: bytes) -> None:
 def _clip(name: str, content: bytes, character: CharacterSpec, stop: Stop) -> Clip:
     """The file's motion; what is said of it speaks of the name that its owner knows."""
     own = Path(name)
-    with tempfile.TemporaryDirectory() as folder:
+    with one_line(name), tempfile.TemporaryDirectory() as folder:
         # letters may take four bytes each, and a name of a file 255 in all
         stem = _plain(own.stem).encode()[:_STEM_BYTES].decode(errors="ignore")
         path = Path(folder) / f"{stem}{own.suffix.lower()}"

@@ -7,6 +7,7 @@ import dataclasses
 import json
 import threading
 import time
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -129,10 +130,12 @@ class Session:
 
 
 def error_message(request: Request | None, error: Exception) -> str:
-    """What a page is told: one line. What is not meant for users is only named."""
+    """What a page is told: one line. What is not meant for users is named, and said here."""
     text = str(error)
     if not type(error).__module__.startswith("getup_jax."):
-        text = f"the editor failed at this ({type(error).__name__}); please report how it came"
+        kind, name = request.type if request else "message", type(error).__name__
+        warnings.warn(f"{kind}: {name}: {text}", stacklevel=2)
+        text = f"the editor failed at this ({name}); its terminal says more"
     answer: dict[str, Any] = {"type": "error", "text": " ".join(text.split())[:2000]}
     if request is not None:
         answer |= {"number": request.number, "of": request.type}

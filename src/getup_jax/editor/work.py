@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import warnings
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -50,8 +49,6 @@ class Work:
             async with slot:
                 box.put(await _in_thread(lambda stop: answer(request, session, stop)))
         except Exception as error:  # told to the page, the server lives
-            if not type(error).__module__.startswith("getup_jax."):
-                warnings.warn(f"{request.type}: {type(error).__name__}: {error}", stacklevel=2)
             box.put(error_message(request, error))
 
 

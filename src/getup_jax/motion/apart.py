@@ -51,6 +51,9 @@ class Stop:
                 process.kill()
         try:
             yield
+        except BaseException:  # Ctrl-C, too: nobody would wait for it
+            process.kill()
+            raise
         finally:
             with self._lock:
                 self._processes.discard(process)
