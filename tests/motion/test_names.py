@@ -90,10 +90,21 @@ def test_map_files(tmp_path, suffix):
         ("- a\n", "expected lines such as"),
         ("a: tail\n", "unknown links tail"),
         ("a: [", "readable"),
+        ("[" * 5000, "readable name map: nested more than 40 deep"),
+        ("a: " + "1" * 5000, "readable name map: '11+...1+' cannot be read as int"),
+        ("a: b\0", "readable name map: not text"),
     ],
 )
 def test_bad_map_files(tmp_path, text, message):
     file = tmp_path / "map.yaml"
     file.write_text(text)
-    with pytest.raises(MotionError, match=message):
+    with pytest.raises(MotionError, match=message) as caught:
+        read_map(file)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_json_map_that_is_nested_too_deep(tmp_path):
+    file = tmp_path / "map.json"
+    file.write_text("[" * 100_000)
+    with pytest.raises(MotionError, match="not a readable name map"):
         read_map(file)

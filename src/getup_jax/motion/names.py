@@ -12,8 +12,8 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import yaml
-
+from getup_jax import yaml_text
+from getup_jax.config.check import shown
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.prefixes import without_prefix
 
@@ -109,15 +109,21 @@ def listed(names: Sequence[str], most: int = _SHOWN) -> str:
 def read_map(path: str | Path) -> dict[str, str | None]:
     """A user's {joint: link} file, YAML or JSON."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
-        values = json.loads(text) if str(path).endswith(".json") else yaml.safe_load(text)
-    except (OSError, ValueError, yaml.YAMLError) as error:
-        raise MotionError(f"{path}: not a readable name map: {error}") from None
+        text = Path(path).read_bytes()
+        values = json.loads(text) if str(path).endswith(".json") else yaml_text.parse(text)
+    except OSError as error:
+        problem = error.strerror or error
+        raise MotionError(f"{path}: not a readable name map: {problem}") from None
+    except (ValueError, RecursionError) as error:
+        problem = " ".join(str(error).split())
+        raise MotionError(f"{path}: not a readable name map: {problem}") from None
     if not isinstance(values, dict):
-        raise MotionError(f"{path}: expected lines such as 'LeftUpLeg: thigh_l', got {values!r}")
+        raise MotionError(
+            f"{path}: expected lines such as 'LeftUpLeg: thigh_l', got {shown(values)}"
+        )
     bad = sorted(str(v) for v in values.values() if v is not None and v not in LINKS)
     if bad:
-        raise MotionError(f"{path}: unknown links {', '.join(bad)}; links are {', '.join(LINKS)}")
+        raise MotionError(f"{path}: unknown links {listed(bad)}; links are {', '.join(LINKS)}")
     return {str(key): value for key, value in values.items()}
 
 
