@@ -101,5 +101,27 @@ def test_the_bound_of_edits(built):
     found = bound(built, learner, policy, edit_plan(built, 1, seed=0), seen.append)
     assert seen == [1, 2, 3, 4]
     assert (found.edits, found.curves) == (1, 2)
-    assert 0.01 < found.features["height"].asked_rms < 0.1
-    assert np.isfinite([row.gain for row in found.features.values()]).all()
+    # it gets nobody up, and so says nothing
+    assert found.success == 0.0
+    assert np.isnan([row.gain for row in found.features.values()]).all()
+
+
+def test_the_bound_is_of_edits_for_which_it_got_up(built, monkeypatch):
+    steps = iter([(1.0, 0.0), (1.0, 0.3), (1.0, 0.0), (0.5, 0.9)])
+
+    def follow_exactly(self, getup, row, curve, key):
+        """Follows half of the change, and stands at a share of the end, the first of the pair."""
+        share, moved = next(steps)
+        time = np.arange(1.0, 41.0) / 40
+        target = np.tile([1.4, 1.5, 1.5], (40, 1)) + moved * np.sin(9 * time)[:, None]
+        features = target - 0.5 * (target - [1.4, 1.5, 1.5])
+        features[-1, 0] = share * target[-1, 0]
+        return Steps(features, target, time)
+
+    monkeypatch.setattr(Search, "follow", follow_exactly)
+    plan = edit_plan(built, 1, seed=0)
+    found = bound(built, None, None, plan, lambda done: None)
+    assert found.success == 0.5
+    for row in found.features.values():
+        assert row.gain == pytest.approx(0.5, abs=0.02)
+        assert row.asked_rms < 0.3

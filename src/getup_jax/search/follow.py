@@ -2,8 +2,8 @@
 
 Many copies of the body act as the policy does, and beside it with noise that lasts. Those that are
 nearest to the curves over a look-ahead, at the price of equation 3 for offsets, go on. So what the
-search follows is within the physics and the actions of the policy, if not within its knowledge.
-It is greedy: where it gets lost, nothing says that the curve cannot be followed.
+search follows is within the physics and the actions of the policy, if not within its knowledge. It
+is greedy: where it gets lost, nothing says that the curve cannot be followed.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from getup_jax.motion.align import FEATURE_SCALE
 from getup_jax.search.sampling import Sampler
 from getup_jax.tasks.build import BuiltTask
 from getup_jax.tasks.drawn_curves import Curve
-from getup_jax.tasks.episode import LYING, EpisodeState
+from getup_jax.tasks.episode import LYING, STAND_LOWEST, EpisodeState
 from getup_jax.tasks.getup import GetUpTask, World
 from getup_jax.types import take
 
@@ -36,6 +36,7 @@ WINDOW = 3  # control steps of which the fittest go on
 AHEAD = 24  # control steps that decide which these are: .8 s
 SPREAD_RAD = 0.15  # largest standard deviation of a hinge's noise
 _LASTS = 0.9  # share of a parent's noise that its children keep
+_TAMEST = -3.0  # beside a policy that knows the way, small changes matter
 _FAILED = 1e3  # cost of a step that is not finite
 _ENDED = 50.0  # of a look-ahead in which an episode ends early
 _AFTER_S = 0.5  # the search goes on so long after the curve's end
@@ -80,7 +81,7 @@ class Follower:
         sampler = Sampler(self.env, PARENTS, CHILDREN)
         parent = jnp.arange(CHILDREN) % PARENTS
         before = population.push[parent]
-        push = _LASTS * before + sampler.noise(SPREAD_RAD, key)
+        push = _LASTS * before + sampler.noise(SPREAD_RAD, key, _TAMEST)
         second = jnp.arange(CHILDREN) // PARENTS == 1
         push = jnp.where(second[:, None], 0.0, push)  # the policy alone is always tried
 
@@ -144,7 +145,11 @@ class Search:
 def bound(
     task: BuiltTask, learner: Learner, policy: Any, plan: Plan, progress: Progress
 ) -> ControlGain:
-    """The control gain of the search for the episodes of a plan of `edit_plan`, one by one."""
+    """The control gain of the search for the episodes of a plan of `edit_plan`, one by one.
+
+    Only of edits for which it got up along both the variant and the curve; `success` is the share
+    of the variants for which it did. Where it got lost, it says nothing about what is possible.
+    """
     search = Search(task, lambda observation: learner.act(policy, observation))
     curves, found = plan_curves(task, plan), []
     for number in range(len(plan.getup)):
@@ -159,13 +164,21 @@ def bound(
         padded = [np.pad(x, [(0, most - len(x))] + [(0, 0)] * (x.ndim - 1)) for x in values]
         return np.stack(padded, axis=1)
 
+    stands = np.array([gets_up(steps) for steps in found])
+    rises = [s.time < t for s, t in zip(found, np.asarray(curves.duration), strict=True)]
     responses = of_values(
         joined([steps.features for steps in found]),
         joined([steps.target for steps in found]),
-        joined([s.time < t for s, t in zip(found, np.asarray(curves.duration), strict=True)]),
+        joined(rises) & stands,
         curves_of(plan),
     )
-    return gain_of(responses, task, success=math.nan)
+    variants = stands.reshape(responses.curves, -1)[:, 1:]
+    return gain_of(responses, task, float(variants.mean()))
+
+
+def gets_up(steps: Steps) -> bool:
+    """Whether the last of the steps [T, ...] stands as high as success asks."""
+    return bool(steps.features[-1, 0] >= STAND_LOWEST * steps.target[-1, 0])
 
 
 def _way_to(number: int, history: list[tuple[np.ndarray, Steps]]) -> Steps:

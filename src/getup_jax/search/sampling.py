@@ -19,6 +19,7 @@ _PERSISTENCE = 0.8  # share of a parent's change that its children keep
 _CHANGED = 0.5  # share of the action's entries that a child changes
 _POSE_SCALE_M = 0.08  # mean distance of the links that counts as FEATURE_SCALE does
 _LATENT_SPREAD = 2.5  # of the latent's entries, for a spread of 1 rad in the hinges
+_TAMEST, _WILDEST = -2.0, 0.5  # logarithms of the smallest and largest share of the spread
 _FAILED = 1e3  # cost of a state that is not finite
 
 
@@ -106,14 +107,19 @@ class Sampler:
             Window(parent=parent[chosen], task_reward=reward[-1, chosen]),
         )
 
-    def noise(self, spread: jax.Array | float, key: jax.Array) -> jax.Array:
-        """Changes [B, A] of the filtered action, from none (one child of each parent) to wild."""
+    def noise(
+        self, spread: jax.Array | float, key: jax.Array, tamest: float = _TAMEST
+    ) -> jax.Array:
+        """Changes [B, A] of the filtered action, from none (one child of each parent) to wild.
+
+        tamest: logarithm of the smallest size of the others, as a share of the spread.
+        """
         key_value, key_size, key_which = jax.random.split(key, 3)
         shape = (self.children, self.env.action_size)
         latent = self.env.latent_size
         hinge = jnp.full(shape[1] - latent, 1.0 / self.env.config.offset_scale)
         scale = spread * jnp.concatenate([jnp.full(latent, _LATENT_SPREAD), hinge])
-        size = jnp.exp(jax.random.uniform(key_size, (shape[0], 1), minval=-2.0, maxval=0.5))
+        size = jnp.exp(jax.random.uniform(key_size, (shape[0], 1), minval=tamest, maxval=_WILDEST))
         which = jax.random.uniform(key_which, shape) < _CHANGED
         noise = scale * size * which * jax.random.normal(key_value, shape)
         return jnp.where(jnp.arange(self.children)[:, None] < self.size, 0.0, noise)
