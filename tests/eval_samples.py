@@ -15,6 +15,7 @@ from getup_jax.conditions import Conditions, make_plan
 from getup_jax.config import Config, NetworkConfig
 from getup_jax.episodes import Episodes, run_episodes
 from getup_jax.nets.prior import to_dict
+from getup_jax.physics.body_digest import body_digest
 from getup_jax.physics.character import load_character
 from getup_jax.tasks.build import BuiltTask
 
@@ -43,10 +44,17 @@ def run(task: BuiltTask, conditions: Conditions, number: int) -> Episodes:
     return run_episodes(task, learner, policy, plan, lambda _: None)
 
 
-def save_policy(folder: Path, task: BuiltTask, config: Config = SMALL, iteration: int = 3) -> Path:
-    """A run folder with one checkpoint of an untrained policy."""
+def save_policy(
+    folder: Path,
+    task: BuiltTask,
+    config: Config = SMALL,
+    iteration: int = 3,
+    body: dict[str, str] | None = None,
+) -> Path:
+    """A run folder with one checkpoint of an untrained policy, of the task's body by default."""
     _, policy = make_policy(task, config)
     item = {"policy": policy, "prior": to_dict(task.prior)}
-    metadata = {"steps": 100 * iteration}
+    body = body or body_digest(task.environment.character.model)
+    metadata = {"steps": 100 * iteration, "body": body}
     save_learner(folder / CHECKPOINTS, iteration, policy, config, item, metadata)
     return folder

@@ -8,6 +8,8 @@ from tiny_task import getups
 
 from getup_jax.conditions import Conditions, blended, make_plan, of_config, orientation
 from getup_jax.config import Config, ConfigError, PhysicsConfig
+from getup_jax.motion.body import record
+from getup_jax.motion.bvh_writer import write_bvh
 from getup_jax.motion.clips import GetUp
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.settings import load_config
@@ -121,3 +123,12 @@ def test_the_motions_of_another_config_take_the_place_of_the_trained_ones(
     config.write_text("motions: {}\n")
     with pytest.raises(ConfigError, match="motions"):
         of_config(str(config), styles, character)
+
+
+def test_a_motion_file_takes_their_place_too(styles, character, tmp_path, monkeypatch):
+    monkeypatch.setenv("GETUP_JAX_CACHE", str(tmp_path / "cache"))
+    qpos = np.tile(character.neutral_qpos, (70, 1))
+    qpos[:30, 2:7] = [0.12, np.sqrt(0.5), 0, -np.sqrt(0.5), 0]  # on its back, then upright
+    write_bvh(record(Clip("take", 30.0, qpos), character), tmp_path / "take.bvh")
+    (found,) = of_config(str(tmp_path / "take.bvh"), styles, character)
+    assert found.name.startswith("take:")

@@ -109,6 +109,15 @@ def test_bodies_are_dropped_as_asked_and_not_those_of_the_training():
     assert task("--drops", "paper", config=alike).limp_drops != paper.limp_drops
 
 
+def test_a_policy_on_another_body_is_said_in_one_line(tmp_path, monkeypatch, capsys):
+    task = make_task()
+    run_folder = save_policy(tmp_path / "tiny", task, body={"masses": "another", "servos": "too"})
+    monkeypatch.setattr(evaluate, "build_task", build)
+    assert cli.eval_main(["--ckpt", str(run_folder), "--episodes", "1", "--stand-time", "1"]) == 0
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if "warning" in x]
+    assert f"{run_folder}/checkpoints/00000003: was trained on a body with other " in line
+
+
 def test_how_bodies_lie_means_nothing_to_standing_starts(run_folder, capsys):
     assert cli.eval_main(["--ckpt", str(run_folder), "--drops", "paper", "--start=standing"]) == 2
     assert capsys.readouterr().err.startswith("ConfigError: --drops: says how bodies lie")

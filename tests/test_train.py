@@ -87,11 +87,11 @@ class ToyLearner:
         return State(learner, state.environment * 3 + 1, state.key, number), metrics
 
 
-def builder(learner: ToyLearner | None = None, log: list[str] | None = None):
+def builder(learner: ToyLearner | None = None, body: dict[str, str] | None = None):
     def build(config: Config, say) -> Job:
         say("toy task")
         world = {"scale": np.float32(0.001)}
-        return Job(learner or ToyLearner(), world, {"decoder": jnp.ones(2)})
+        return Job(learner or ToyLearner(), world, {"decoder": jnp.ones(2)}, body=body)
 
     return build
 
@@ -239,6 +239,23 @@ def test_only_a_run_has_a_learner_to_go_on_with(tmp_path, unbroken):
         train(tmp_path / "run", 1, f"train.init_from={exported}", "train.init_learner=true")
     with pytest.raises(ConfigError, match=r"train\.init_learner: expected train\.init_from"):
         train(tmp_path / "run", 1, "train.init_learner=true")
+
+
+def test_a_checkpoint_remembers_the_body_and_runs_say_where_it_is_another(tmp_path, capsys):
+    body, heavier = {"masses": "a", "servos": "b"}, {"masses": "c", "servos": "b"}
+    first = tmp_path / "first"
+    run(settings(1), first, quiet=False, build=builder(body=body))
+    assert checkpoint.load_policy(first).metadata["body"] == body
+    begin = settings(1, f"train.init_from={first}")
+    run(begin, tmp_path / "same", quiet=False, build=builder(body=body))
+    assert "warning" not in capsys.readouterr().out
+    run(begin, tmp_path / "other", quiet=False, build=builder(body=heavier))
+    warning = "was trained on a body with other masses; "
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if "warning" in x]
+    assert warning in line
+    run(settings(2), first, True, False, builder(body=heavier))
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if "warning" in x]
+    assert warning in line
 
 
 # --- the run folder

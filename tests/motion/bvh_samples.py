@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from getup_jax.motion.axes import shortest_turn
 from getup_jax.motion.cache import read_npz
 from getup_jax.motion.command import main
 from getup_jax.motion.identify import identify
 from getup_jax.motion.readers import read_motion
+from getup_jax.motion.skeleton import Recording
 
 # name, parent, OFFSET (cm, Y up): a T-pose, facing +z
 SKELETON: tuple[tuple[str, str, tuple[float, float, float]], ...] = (
@@ -106,6 +110,31 @@ BASE = human_bvh()
 HEADER, _, MOTION = BASE.partition("MOTION\n")
 TIMING = f"Frames: {FRAMES}\nFrame Time: 0.0333333\n"
 ROWS = MOTION.removeprefix(TIMING)
+
+
+def along_x(recording: Recording) -> Recording:
+    """The same motion of a skeleton whose zero pose says nothing: every bone lies along +X."""
+    count = len(recording.joint_names)
+    axes = np.tile(np.eye(3), (count, 1, 1))  # the new axes in the old ones
+    for joint, parent in enumerate(recording.parents):
+        below = [recording.offsets[i] for i in range(count) if recording.parents[i] == joint]
+        bone = next((offset for offset in below if offset.any()), None)
+        along = axes[parent] if bone is None else shortest_turn(np.array([1.0, 0, 0]), bone)
+        axes[joint] = along
+    above = np.stack([np.eye(3), *(axes[parent] for parent in recording.parents[1:])])
+    old = Rotation.from_quat(recording.rotations.reshape(-1, 4), scalar_first=True).as_matrix()
+    turns = np.swapaxes(above, 1, 2) @ old.reshape(-1, count, 3, 3) @ axes
+    quaternions = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    offsets = np.einsum("jba,jb->ja", above, recording.offsets)
+    translations = np.tile(offsets, (recording.num_frames, 1, 1))
+    translations[:, 0] = recording.translations[:, 0]
+    return dataclasses.replace(
+        recording,
+        offsets=offsets,
+        translations=translations,
+        rotations=quaternions.reshape(-1, count, 4),
+        ends={joint: axes[joint].T @ end for joint, end in recording.ends.items()},
+    )
 
 
 def with_rows(header, change):

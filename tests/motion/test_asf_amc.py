@@ -70,11 +70,61 @@ def test_bones_turn_about_their_own_axes(tmp_path):
         ("spine 90", "tail 90", "line 9, bone tail"),
         ("spine 90\n", "", r"frame 2: no values for bones \['spine'\]"),
         (AMC, "", "expected frames, got none"),
+        ("spine 90", "spine 1e308", "line 9, bone spine: expected finite numbers"),
+        ("spine 90", "spine 90\nspine 90", "line 10, bone spine: expected 1 angles, once a frame"),
+        (":DEGREES", ":RADIANS", "line 3: expected :DEGREES, got :RADIANS"),
     ],
 )
 def test_errors_name_the_line_and_the_bone(tmp_path, old, new, message):
     with pytest.raises(MotionError, match=message):
         read_motion(write(tmp_path, amc=AMC.replace(old, new)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("name spine", "name head", "bone head appears twice"),
+        ("direction 0 1 0", "direction 0 1", r"line 9: direction: expected 3 finite numbers"),
+        ("length 2", "length", "line 10: length: expected 1 finite numbers, got ''"),
+        ("axis 0 0 90 XYZ", "axis 0 0 90 ZYX", "line 11: axis: expected the order XYZ, got 'ZYX'"),
+        ("  axis XYZ", "  axis ZYX", "line 4: axis: expected the order XYZ"),
+        ("dof rx", "dof rx l", "line 12: dof: expected some of tx, .* got 'rx l'"),
+        ("dof rx", "dof rx rx", "line 12: dof: expected some of tx"),
+        ("spine head", "head spine", "expected bones with a hierarchy; without parent"),
+        ("spine head", "spine tail", r"unknown bones \['tail'\]; known are root, spine, head"),
+        (":root", ":units\n  angle rad\n:root", "line 3: angle: expected deg, got 'rad'"),
+    ],
+)
+def test_skeletons_that_would_be_misread_are_refused(tmp_path, old, new, message):
+    assert old in ASF
+    with pytest.raises(MotionError, match=message) as caught:
+        read_motion(write(tmp_path, asf=ASF.replace(old, new, 1)))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.encode("utf-8-sig"),
+        lambda text: text.encode("utf-16"),
+        lambda text: text.replace("\n", "\r").encode(),
+        lambda text: (text + "\0\0\x1a").encode(),
+        lambda text: text.replace("\n", "  # said by hand\n").encode(),
+        lambda text: text.replace("\n", "\n\n").encode(),
+        lambda text: text.replace("begin", "BEGIN").replace("name ", "Name ").encode(),
+        lambda text: text.replace(":hierarchy", ":HIERARCHY").encode(),
+    ],
+)
+def test_other_forms_of_both_files_say_the_same(tmp_path, change):
+    expected = read_motion(write(tmp_path))
+    file = write(tmp_path)
+    file.write_bytes(change(AMC))
+    (tmp_path / "01.asf").rename(tmp_path / "01.ASF")
+    (tmp_path / "01.ASF").write_bytes(change(ASF))
+    found = read_motion(file)
+    assert found.joint_names == expected.joint_names
+    np.testing.assert_array_equal(found.translations, expected.translations)
+    np.testing.assert_array_equal(found.rotations, expected.rotations)
 
 
 def test_a_missing_skeleton(tmp_path):

@@ -95,6 +95,23 @@ def test_a_clip_that_never_lies_is_warned_about(tmp_path, character, cache, caps
     assert "no get-up found: it never lies" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("--fps", "0"),
+        ("--fps", "nan"),
+        ("--source-fps", "1e9"),
+        ("--scale", "0"),
+        ("--floor", "inf"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused(rise, option, value, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["import", str(rise), option, value])
+    assert stop.value.code == 2
+    assert f"argument {option}: expected " in capsys.readouterr().err
+
+
 def test_an_empty_folder_and_a_missing_map(tmp_path, rise):
     empty = tmp_path / "empty"
     empty.mkdir()

@@ -134,6 +134,29 @@ def test_a_missing_file_is_an_error_of_the_user(tmp_path):
         read_curve_file(tmp_path / "no.yaml")
 
 
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        ("take.bvh", 10),
+        ("take.BVH", 90_000),
+        ("clip.npz", 10),
+        ("take.amc", 10),
+        ("a.json", 90_000),
+    ],
+)
+def test_a_motion_file_points_to_the_option_for_motions(tmp_path, name, size):
+    file = tmp_path / name
+    file.write_bytes(b"x" * size)
+    with pytest.raises(MotionError, match=rf"{name}: expected a curve file .* --motions {file}"):
+        read_curve_file(file)
+
+
+def test_a_large_file_that_may_be_a_curve_is_too_large(tmp_path):
+    (tmp_path / "large.yaml").write_text("x" * 90_000)
+    with pytest.raises(MotionError, match=r"large\.yaml: expected at most 64000 bytes"):
+        read_curve_file(tmp_path / "large.yaml")
+
+
 def test_a_config_takes_a_curve_file_as_a_source(character, tmp_path, monkeypatch):
     pose = character.neutral_qpos[None]
     clip = GetUp("prone_quadruped_squat", 1.0, np.zeros((9, 3)), Clip("squat", 30.0, pose))

@@ -58,6 +58,15 @@ def test_deepmimic_frames_of_unequal_duration_are_put_on_one_rate(tmp_path):
         ({"Frames": [deepmimic_row(0.0), deepmimic_row()]}, "frame 0: expected a duration above 0"),
         ('{"Frames": [[1.0,\n nan]]', "line 2: broken JSON"),
         ({"poses": []}, "expected DeepMimic's"),
+        ({"Frames": [[*deepmimic_row()[:-1], 10**400]]}, "frame 0, column 43: expected a finite"),
+        ({"Frames": [[*deepmimic_row()[:-1], 1e308]]}, "frame 0, column 43: expected a finite"),
+        ({"Frames": [[*deepmimic_row()[:-1], True]]}, "frame 0, column 43: expected a finite"),
+        ({"Frames": [deepmimic_row(1e-200), deepmimic_row()]}, "frame 0: expected a duration"),
+        ({"Frames": [deepmimic_row(9e5), deepmimic_row()]}, "frame 0: expected a duration above 0"),
+        (
+            {"Frames": [[*deepmimic_row()[:4], 0, 0, 0, 0, *deepmimic_row()[8:]]]},
+            "frame 0, joint root: expected a rotation, got a zero quaternion",
+        ),
     ],
 )
 def test_deepmimic_errors(tmp_path, content, message):
@@ -84,6 +93,9 @@ def test_composite_bodies_that_are_left_out_keep_the_identity(tmp_path):
         ({"fps": 30, "frames": [{"pelvis": [[0, 0, 1], [0, 0, 0, 0]]}]}, "zero quaternion"),
         ({"fps": 30, "frames": [{"pelvis": [[0, 0], IDENTITY]}]}, "pelvis: expected 3 finite"),
         ({"fps": 30, "frames": [{"pelvis": IDENTITY}]}, r"pelvis: expected \[\[x, y, z\]"),
+        ({"fps": 30, "frames": [{"pelvis": [[0, 0, 10**400], IDENTITY]}]}, "expected 3 finite"),
+        ({"fps": 30, "frames": [{"pelvis": [[0, 0, 1e300], IDENTITY]}]}, "expected 3 finite"),
+        ({"fps": 1e300, "frames": [{"pelvis": [[0, 0, 1], IDENTITY]}]}, "fps: expected a number"),
     ],
 )
 def test_composite_errors(tmp_path, content, message):
@@ -98,7 +110,18 @@ def test_unknown_suffixes_and_missing_files(tmp_path):
         read_motion(tmp_path / "b.bvh")
 
 
+def test_text_files_may_come_in_any_encoding(tmp_path):
+    content = json.dumps({"Loop": "none", "Frames": [deepmimic_row(), deepmimic_row()]})
+    expected = read_motion(write(tmp_path, content, "plain.txt"))
+    for encoding in ("utf-8-sig", "utf-16", "utf-16-le"):
+        file = tmp_path / f"{encoding}.txt"
+        file.write_bytes(content.encode(encoding) + b"\0\0")
+        np.testing.assert_array_equal(read_motion(file).rotations, expected.rotations)
+        assert file in motion_files(tmp_path)
+
+
 def test_a_folder_gives_its_motion_files_only(tmp_path):
+    (tmp_path / "folder.bvh").mkdir()
     write(tmp_path, "some notes", "readme.txt")
     write(tmp_path, {"other": 1}, "settings.json")
     clip = write(tmp_path, {"fps": 30, "frames": []}, "clip.json")

@@ -129,9 +129,15 @@ def test_clips_as_files(character, folder, tmp_path):
     assert same == report
     np.testing.assert_allclose(again.qpos, clip.qpos, atol=1e-6)
     assert len(load(character, str(file)).getups) == 1
-    other = dataclasses.replace(character, joint_names=("knee",))
-    with pytest.raises(MotionError, match="import its source again"):
-        read_npz(file, other)
+    names = character.joint_names
+    for joints, message in (
+        (("knee", *names[1:]), f"lacks joint knee, has joint {names[0]}, which this one has not"),
+        (names[1:], f"has joint {names[0]}, which this one has not"),
+        ((*names, "tail_flex"), "lacks joint tail_flex; import its source again"),
+        (names[::-1], f"another order, {names[0]} where this one has {names[-1]}; import"),
+    ):
+        with pytest.raises(MotionError, match=f"made for another character: .*{message}"):
+            read_npz(file, dataclasses.replace(character, joint_names=joints))
     file.write_bytes(b"no clip")
     with pytest.raises(MotionError, match="not a clip"):
         read_npz(file, character)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -125,6 +126,29 @@ def test_a_leading_t_pose_is_found_and_an_ordinary_start_is_not(character):
     result, report = retarget(with_t, character)
     assert "first row is a T-pose: dropped" in report.warnings[0]
     np.testing.assert_allclose(result.qpos[0], result.qpos[1], atol=0.05)
+
+
+def test_links_that_are_far_from_the_recording_are_named(character):
+    clip = getup_clip(character, still_s=0.2, rise_s=0.5)
+    good = record(clip, character)
+    assert retarget(good, character)[1].warnings == ()
+    swapped = {"hand_l": "hand_r", "hand_r": "hand_l", "forearm_l": "forearm_r"}
+    swapped |= {"forearm_r": "forearm_l", "shin_l": "shin_r", "shin_r": "shin_l"}
+    _, report = retarget(good, character, RetargetSettings(names=swapped))
+    (warning,) = report.warnings
+    assert re.match(
+        r"mean error \d+\.\d cm, at most 5 cm are usual: .* at \w+_[lr] \d+ cm, ", warning
+    )
+    assert "--names" in warning
+    assert len(re.findall(r"_[lr] \d+ cm", warning)) <= 6
+
+
+def test_a_motion_of_a_day_is_one_line(character):
+    slow = dataclasses.replace(record(getup_clip(character), character), fps=1e-3)
+    with pytest.raises(
+        MotionError, match=r"rise: 120 frames at 0\.001 a second are 3,600,000 at 30"
+    ):
+        retarget(slow, character)
 
 
 def test_missing_joints_are_an_error(character):

@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from bvh_samples import BASE, along_x, write
+from motion_samples import two_bones
+
+from getup_jax.motion.bvh import Y_UP, BvhOptions, read_bvh
+from getup_jax.motion.bvh_writer import write_bvh
+from getup_jax.motion.readers import read_motion
+from getup_jax.motion.skeleton import forward, turned
+from getup_jax.motion.upright import vertical_axis
+
+
+@pytest.fixture
+def human(tmp_path):
+    """In our axes, Z up."""
+    return read_motion(write(tmp_path, BASE))
+
+
+def still(recording, frame):
+    """The recording that stays as in one of its frames."""
+    return dataclasses.replace(
+        recording,
+        translations=recording.translations[[frame] * 5],
+        rotations=recording.rotations[[frame] * 5],
+    )
+
+
+def test_a_zero_pose_that_stands_says_it(human):
+    assert vertical_axis(human) == "z"
+    assert vertical_axis(turned(human, Y_UP.inv())) == "y"
+    assert vertical_axis(still(human, 0)) == "z"  # though the motion lies along y
+
+
+def test_a_motion_that_stands_on_a_floor_says_it_where_the_zero_pose_does_not(human):
+    assert vertical_axis(along_x(human)) == "z"
+    assert vertical_axis(turned(along_x(human), Y_UP.inv())) == "y"
+
+
+@pytest.mark.parametrize("frame", [0, -1])
+def test_a_still_body_whose_zero_pose_does_not_stand_says_nothing(human, frame):
+    """It may stand along one axis as well as lie along the other."""
+    assert vertical_axis(still(along_x(human), frame)) is None
+
+
+def test_a_skeleton_that_is_no_body_says_nothing():
+    assert vertical_axis(two_bones([[[1.0, 0, 0, 0], [1.0, 0, 0, 0]]])) is None
+
+
+def test_files_are_read_along_their_own_axis_unless_another_is_asked_for(human, tmp_path):
+    write_bvh(turned(human, Y_UP), tmp_path / "z.bvh")
+    expected = forward(human)[0]
+    for up in ("auto", "z"):
+        found = forward(read_bvh(tmp_path / "z.bvh", BvhOptions(metres=0.01, up=up)))[0]
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+    other = forward(read_bvh(tmp_path / "z.bvh", BvhOptions(metres=0.01, up="y")))[0]
+    np.testing.assert_allclose(other, expected @ Y_UP.as_matrix().T, atol=1e-5)
