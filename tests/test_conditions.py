@@ -10,7 +10,7 @@ from getup_jax.conditions import Conditions, blended, make_plan, of_config, orie
 from getup_jax.config import Config, ConfigError, PhysicsConfig
 from getup_jax.motion.body import record
 from getup_jax.motion.bvh_writer import write_bvh
-from getup_jax.motion.clips import GetUp
+from getup_jax.motion.clips import Clip, GetUp
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.settings import load_config
 from getup_jax.tasks.reset_pool import angle_gap
