@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from getup_jax.physics.body_digest import KEY, body_digest, warn_if_other
 from getup_jax.physics.character import load_character
 from getup_jax.physics.props import Equipment
 from getup_jax.physics.terrain_map import make_terrain
+from getup_jax.settings import load_saved_config
+from getup_jax.tasks.build_composite import equipment_of
 
 OWN = asset_path("humanoid49.xml").read_text()
 
@@ -98,3 +101,12 @@ def test_the_same_body_and_unknown_ones_give_no_warning(metadata, known):
     warn_if_other(Path("x"), metadata, own if known else None, lines.append)
     warn_if_other(Path("x"), {KEY: dict(own)}, own, lines.append)
     assert lines == []
+
+
+@pytest.mark.parametrize("name", ["flat", "terrain", "walk", "walk_aim", "wave_squat"])
+def test_shipped_policies_know_the_body_of_their_settings(name):
+    folder = asset_path("checkpoints", name)
+    config = load_saved_config(folder / "config.yaml")
+    equipment = equipment_of(config.composite.goals) if config.composite_motion else None
+    body = body_digest(load_character(config.physics, equipment=equipment).model)
+    assert json.loads((folder / "checkpoint.json").read_text())["metadata"][KEY] == body

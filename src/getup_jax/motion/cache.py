@@ -187,5 +187,5 @@ def _file(job: Job) -> Path:
 
 def _companions(path: Path) -> Iterator[Path]:
     """Other files that a motion file needs: the .asf skeletons beside an .amc."""
-    if path.suffix.lower() == ".amc":
+    if path.suffix.lower() == ".amc" and path.is_file():
         yield from sorted(f for f in path.parent.iterdir() if f.suffix.lower() == ".asf")
