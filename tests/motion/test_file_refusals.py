@@ -66,7 +66,7 @@ REFUSED = {
     "a zip archive": (b"PK\x03\x04" + bytes(100), "got a zip archive; unpack it"),
     "a web page": ("<!doctype html>\n<html></html>", "got a web page; download the file itself"),
     "binary data": (bytes(range(256)) * 9, "expected a text file, got binary data"),
-    "nothing": ("", "expected HIERARCHY, got an empty file"),
+    "nothing": ("", "expected HIERARCHY, got nothing"),
     "all bones without length": (
         zero(*(name for name in ("Spine", "LeftUpLeg", "RightUpLeg", "LeftLeg", "RightLeg")))
         .replace("-41.000000", "0")

@@ -16,6 +16,12 @@ def test_a_shared_prefix_is_taken_off(prefix):
     assert list(NAMES) in found
 
 
+@pytest.mark.parametrize("suffix", ["_jnt", " (1)", "-bone", ".001"])
+def test_a_shared_suffix_is_taken_off(suffix):
+    assert list(NAMES) in without_prefix([name + suffix for name in NAMES], 11)
+    assert set(links([name + suffix for name in NAMES])) == set(links(list(NAMES)))
+
+
 def test_few_joints_share_no_prefix():
     assert without_prefix(["a:Hips", "a:Spine", "Camera"], 11) == [["a:Hips", "a:Spine", "Camera"]]
 
@@ -29,6 +35,12 @@ def test_joints_without_the_prefix_keep_their_names():
 def links(names):
     parents = [-1] * len(names)
     return {link: names[joint] for link, joint in map_names(names, parents).items()}
+
+
+def test_a_side_that_all_joints_end_in_is_no_suffix():
+    names = [f"{name.removeprefix('Left')}_L" for name in LEFT]
+    names += ["Thumb_L", "Index_L", "Middle_L", "Ring_L"]
+    assert links(names)["thigh_l"] == "UpLeg_L"
 
 
 def test_a_side_that_all_joints_begin_with_is_no_prefix():

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from bvh_samples import BASE, along_x, write
 from motion_samples import two_bones
+from scipy.spatial.transform import Rotation
 
 from getup_jax.motion.bvh import Y_UP, BvhOptions, read_bvh
 from getup_jax.motion.bvh_writer import write_bvh
+from getup_jax.motion.clips import MotionError
 from getup_jax.motion.readers import read_motion
 from getup_jax.motion.skeleton import forward, turned
 from getup_jax.motion.upright import vertical_axis
@@ -44,6 +46,23 @@ def test_a_motion_that_stands_on_a_floor_says_it_where_the_zero_pose_does_not(hu
 def test_a_still_body_whose_zero_pose_does_not_stand_says_nothing(human, frame):
     """It may stand along one axis as well as lie along the other."""
     assert vertical_axis(still(along_x(human), frame)) is None
+
+
+@pytest.mark.parametrize("form", [lambda recording: recording, along_x])
+@pytest.mark.parametrize(
+    ("axis", "degrees", "expected"), [("y", 90, "x"), ("x", 180, "-z"), ("x", -90, "y")]
+)
+def test_other_axes_are_seen_too(human, form, axis, degrees, expected):
+    turn = Rotation.from_euler(axis, degrees, degrees=True)
+    assert vertical_axis(turned(form(human), turn)) == expected
+
+
+def test_a_file_along_another_axis_is_refused_unless_asked_for(human, tmp_path):
+    turn = Y_UP * Rotation.from_euler("y", 90, degrees=True)
+    write_bvh(turned(human, turn), tmp_path / "x.bvh")
+    with pytest.raises(MotionError, match=r"^x: the body stands along x, expected y or z; .* --up"):
+        read_bvh(tmp_path / "x.bvh")
+    assert read_bvh(tmp_path / "x.bvh", BvhOptions(up="y")).num_frames == human.num_frames
 
 
 def test_a_skeleton_that_is_no_body_says_nothing():

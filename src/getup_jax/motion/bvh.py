@@ -42,16 +42,27 @@ def read_bvh(path: str | Path, options: BvhOptions = BvhOptions()) -> Recording:
     lines = read_lines(path)
     joints, last = read_hierarchy(path.name, lines)
     timing = read_timing(path.name, lines, last, options.fps)
-    rows, warnings = read_rows(path.name, joints, timing, lines, options.allow_short)
-    if len(rows) * len(joints) > _MOST_POSES:
+    frames = min(timing.frames or len(lines), len(lines) - timing.last_line)
+    if frames * len(joints) > _MOST_POSES:
         raise MotionError(
-            f"{path.name}: {len(rows):,} frames of {len(joints):,} joints are too much at once; "
-            "cut the file"
+            f"{path.name}: {frames:,} frames of {len(joints):,} joints are too much at once; cut "
+            "the file"
         )
+    rows, warnings = read_rows(path.name, joints, timing, lines, options.allow_short)
     raw = _decode(path, joints, rows, 1.0 / timing.frame_time).warn(*warnings)
-    up = (vertical_axis(raw) or "y") if options.up == "auto" else options.up
-    recording = turned(raw, Y_UP) if up == "y" else raw
+    recording = turned(raw, Y_UP) if _up(raw, options.up) == "y" else raw
     return scaled(recording, options.metres or 1.0)
+
+
+def _up(raw: Recording, asked: str) -> str:
+    """y or z: as asked for, else as the file shows."""
+    up = (vertical_axis(raw) or "y") if asked == "auto" else asked
+    if up not in ("y", "z"):
+        raise MotionError(
+            f"{raw.name}: the body stands along {up}, expected y or z; export it with Y up, or "
+            "give --up y or --up z if that is wrong"
+        )
+    return up
 
 
 def _decode(path: Path, joints: Sequence[Joint], rows: np.ndarray, fps: float) -> Recording:

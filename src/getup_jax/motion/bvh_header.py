@@ -15,6 +15,7 @@ from getup_jax.motion.clips import MotionError
 from getup_jax.motion.text import number, said
 
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
+_MOST_LINES = 300_000  # up to MOTION
 MOST_JOINTS = 2000  # ten times a body with fingers, face and clothes
 _BY_SPELLING = {name.lower(): name for name in CHANNELS}
 _NAMED = ("ROOT", "JOINT", "END")
@@ -45,12 +46,15 @@ def without_comment(line: str) -> str:
 def read_hierarchy(name: str, lines: Sequence[str]) -> tuple[list[Joint], int]:
     """The joints, and the number of lines up to and with MOTION; `name` is the file's."""
     parser = _Parser(name)
-    for at, line in enumerate(lines, 1):
+    for at, line in enumerate(lines[:_MOST_LINES], 1):
         if parser.feed(at, _words(without_comment(line))):
             return parser.joints, at
     if not parser.begun:
-        raise MotionError(f"{name}: expected HIERARCHY, got an empty file; not a BVH file")
-    raise MotionError(f"{name}: expected a MOTION section, got none; the file is cut off")
+        raise MotionError(f"{name}: expected HIERARCHY, got nothing; not a BVH file")
+    raise MotionError(
+        f"{name}: expected a MOTION section, got none in {min(len(lines), _MOST_LINES)} lines; the "
+        "file is cut off"
+    )
 
 
 def _words(line: str) -> Iterator[str]:

@@ -16,6 +16,8 @@ OFF_BY_ONE = 1  # rows that a writer may forget: a file that lacks more has lost
 FRAME_S = (1e-4, 1.0)  # shortest and longest frame that anything has recorded
 _KEYS = {"frames": "Frames", "frametime": "Frame Time"}
 _NUMBER = re.compile(r"[-+.]?\d|[-+]?(?:nan|inf)", re.IGNORECASE)
+_CHARACTERS = 64  # of a number and what is around it, at most
+_MOST_WRAPPED = 50_000_000  # characters of rows whose lines are not one frame each
 _LINES = 100  # between MOTION and the first row, at most
 
 
@@ -69,15 +71,25 @@ def read_rows(
     names = [f"{joint.name} {channel}" for joint in joints for channel in joint.channels]
     if not names:
         raise MotionError(f"{file}: expected joints with CHANNELS, got none")
-    whole = _fast(rows, len(names))
-    values = _wrapped(rows, len(names)) if whole is None else whole
-    count = len(rows) if values is None else len(values)
-    if count != timing.frames or not count:
-        warnings.append(_miscounted(file, timing.frames, count, allow_short))
-    used = min(count, timing.frames) if timing.frames else count
+    longest = _CHARACTERS * len(names)  # of a row as it should be
+    if _is_plain(rows, len(names), longest):
+        warnings += _counted(file, timing.frames, len(rows), allow_short)
+        rows = rows[: timing.frames or len(rows)]
+        values = _fast(rows, len(names))
+    else:
+        values = _wrapped(rows, len(names), min(timing.frames * longest, _MOST_WRAPPED))
+        count = len(rows if values is None else values)
+        warnings += _counted(file, timing.frames, count, allow_short)
     if values is None:
-        raise _damage(file, names, rows[:used])
-    return values[:used], warnings
+        raise _damage(file, names, rows)
+    return values[: timing.frames or len(values)], warnings
+
+
+def _is_plain(rows: Sequence[Row], width: int, longest: int) -> bool:
+    """Whether each line is one frame, as far as the first one shows."""
+    if not rows or any(len(row.text) > longest for row in rows):
+        return False
+    return len(rows[0].text.split()) == width
 
 
 def _entries(lines: Sequence[str], start: int) -> tuple[dict[str, tuple[int, str]], int]:
@@ -133,22 +145,27 @@ def _without_tail(rows: list[Row], frames: int) -> tuple[list[Row], list[str]]:
 def _fast(rows: Sequence[Row], width: int) -> np.ndarray | None:
     """The values of rows that are all as they should be, else None."""
     try:
-        values = np.loadtxt([row.text for row in rows], ndmin=2, comments=None) if rows else None
+        values = np.loadtxt([row.text for row in rows], ndmin=2, comments=None)
     except ValueError:
         return None
-    if values is None or values.shape[1] != width:
+    if values.shape[1] != width:
         return None
     return values if (np.abs(values) <= LARGEST).all() else None
 
 
-def _wrapped(rows: Sequence[Row], width: int) -> np.ndarray | None:
-    """The values of frames that take several lines each, or share one; None for all others."""
-    words = [row.text.split() for row in rows]
+def _wrapped(rows: Sequence[Row], width: int, most: int) -> np.ndarray | None:
+    """The values of frames that take several lines each, or share one; None for all others.
+
+    most: characters that the rows may have in all.
+    """
+    if not rows or sum(len(row.text) for row in rows) > most:
+        return None
     if any("_" in row.text for row in rows):  # Python reads 1_0 as 10
         return None
+    words = [row.text.split() for row in rows]
     lengths = np.array([len(line) for line in words], int)
     ends = np.cumsum(lengths)
-    if not rows or ends[-1] % width:
+    if ends[-1] % width:
         return None
     starts_apart = np.isin(np.arange(width, ends[-1] + 1, width), ends).all()
     if not (starts_apart or (lengths % width == 0).all()):
@@ -160,25 +177,29 @@ def _wrapped(rows: Sequence[Row], width: int) -> np.ndarray | None:
     return values.reshape(-1, width) if (np.abs(values) <= LARGEST).all() else None
 
 
-def _miscounted(file: str, frames: int, count: int, allow_short: bool) -> str:
+def _counted(file: str, frames: int, count: int, allow_short: bool) -> list[str]:
     """The warning of a header that says another number of frames, or MotionError."""
     if not frames and not count:
         raise MotionError(f"{file}: expected at least one frame, got none; record or export again")
+    if count == frames:
+        return []
     text = f"header says {frames} frames, file has {count} rows"
     if not count or not (allow_short or frames - count == OFF_BY_ONE):
         hint = "fix the header" + (" or pass --allow-short" if count else "")
         raise MotionError(f"{file}: {text}; {hint}")
-    return f"{text}; {min(count, frames) or count} frames are used"
+    return [f"{text}; {min(count, frames) or count} frames are used"]
 
 
 def _damage(file: str, names: Sequence[str], rows: Sequence[Row]) -> MotionError:
     """The error of the first row with too few or too many values, or with one that is none."""
+    most = 2 * len(names) + 10
     for row in rows:
-        words = row.text.split()
-        if len(words) != len(names):
+        got = len(row.text.split(None, most))
+        if got != len(names):
+            more = "more" if got > most else got
             return MotionError(
                 f"{file}, line {row.line}: expected {len(names)} values, one a channel, got "
-                f"{len(words)}; the row is damaged"
+                f"{more}; the row is damaged"
             )
     for row in rows:
         for name, word in zip(names, row.text.split(), strict=True):

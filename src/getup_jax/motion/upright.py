@@ -7,62 +7,71 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from getup_jax.motion.bones import leg_lengths
 from getup_jax.motion.names import REQUIRED, map_names
 from getup_jax.motion.skeleton import Recording, forward, rest_positions
 
-_AXES = {"y": 1, "z": 2}
+_AXES = {"y": (1, 1.0), "z": (2, 1.0), "x": (0, 1.0)}
+_AXES |= {f"-{name}": (axis, -1.0) for name, (axis, _) in _AXES.items()}
 _ALONG = 0.8  # cosine between the way from the feet to the arms and the axis
 _LOOKS = 300  # frames that are looked at
 # The lowest joint stays on the floor: its height varies by less than the first, in leg lengths,
 # and what is no height by more than the second.
 _FLOOR, _NO_FLOOR = 0.2, 0.4
-_STANDS = 0.1  # share of the frames
+_STANDS, _MOSTLY = 0.1, 0.5  # shares of the frames
 
 
 def vertical_axis(recording: Recording) -> str | None:
-    """y or z in the file's axes, or None where neither skeleton nor motion says."""
+    """x, y or z, with a minus where it points down; None where neither skeleton nor motion says."""
     links = map_names(recording.joint_names, recording.parents)
     if any(link not in links for link in REQUIRED) or not recording.num_frames:
         return None
-    rest = _upwards(rest_positions(recording)[None], links)
-    for name, axis in _AXES.items():
-        if rest[0, axis] > _ALONG:
-            return name
-    return _by_motion(recording, links)
+    rest = rest_positions(recording)
+    upright = [name for name in _AXES if _is_human(rest, links, name)]
+    if upright and upright[0] in ("y", "z"):
+        return upright[0]
+    return _by_motion(_seen(recording), links, upright)
 
 
-def _upwards(position: np.ndarray, links: Mapping[str, int]) -> np.ndarray:
-    """Directions [F, 3] from the feet to the arms' roots."""
+def _is_human(rest: np.ndarray, links: Mapping[str, int], name: str) -> bool:
+    """Whether the zero pose [N, 3] has its arms' root above and its feet below the hips."""
+    axis, sign = _AXES[name]
+    leg = leg_lengths(rest, links, "l").sum()
+    foot, hip, arm = (sign * rest[links[f"{link}_l"], axis] for link in ("foot", "thigh", "arm"))
+    return bool(hip - foot > 0.7 * leg > 0 and arm - hip > 0.2 * leg)
+
+
+def _seen(recording: Recording) -> Recording:
+    """Some of its frames, as many as are needed."""
+    frames = np.unique(np.linspace(0, recording.num_frames - 1, _LOOKS).astype(int))
+    return dataclasses.replace(
+        recording,
+        translations=recording.translations[frames],
+        rotations=recording.rotations[frames],
+    )
+
+
+def _by_motion(recording: Recording, links: Mapping[str, int], upright: list[str]) -> str | None:
+    """The axis along which the body stands on a floor, or mostly is as in a zero pose that stands.
+
+    A body that stays still may stand along one axis as well as lie along another.
+    """
+    position, _ = forward(recording)
     feet, arms = (
         np.mean([position[:, links[f"{link}_{side}"]] for side in "lr"], axis=0)
         for link in ("foot", "arm")
     )
     way = arms - feet
-    return way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
-
-
-def _by_motion(recording: Recording, links: Mapping[str, int]) -> str | None:
-    """The axis along which the body stands on a floor, if it is not the other one's too."""
-    frames = np.unique(np.linspace(0, recording.num_frames - 1, _LOOKS).astype(int))
-    seen = dataclasses.replace(
-        recording,
-        translations=recording.translations[frames],
-        rotations=recording.rotations[frames],
-    )
-    position, _ = forward(seen)
+    way /= np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
     body = position[:, list(links.values())]
-    leg = sum(
-        np.linalg.norm(body_of_leg, axis=-1).mean()
-        for body_of_leg in np.diff(
-            [position[:, links[f"{name}_l"]] for name in ("thigh", "shin", "foot")], axis=0
-        )
-    )
-    up = _upwards(position, links)
-    lowest = body.min(axis=1)
-    low, high = np.percentile(lowest, [5, 95], axis=0)
-    varies = (high - low) / max(float(leg), 1e-9)
-    for (name, axis), other in zip(_AXES.items(), (2, 1), strict=True):
-        stands = np.mean(up[:, axis] > _ALONG) > _STANDS
-        if stands and varies[axis] < _FLOOR and varies[other] > _NO_FLOOR:
+    leg = max(float(leg_lengths(rest_positions(recording), links, "l").sum()), 1e-9)
+    share, varies = {}, {}
+    for name, (axis, sign) in _AXES.items():
+        share[name] = np.mean(sign * way[:, axis] > _ALONG)
+        low, high = np.percentile((sign * body[..., axis]).min(axis=1), [5, 95])
+        varies[name] = (high - low) / leg
+    for name in _AXES:
+        other = "z" if name == "y" else "y"
+        if share[name] > _STANDS and varies[name] < _FLOOR and varies[other] > _NO_FLOOR:
             return name
-    return None
+    return next((name for name in upright if share[name] > _MOSTLY), None)
