@@ -65,6 +65,17 @@ def test_a_file_along_another_axis_is_refused_unless_asked_for(human, tmp_path):
     assert read_bvh(tmp_path / "x.bvh", BvhOptions(up="y")).num_frames == human.num_frames
 
 
+def test_a_zero_pose_along_another_axis_is_no_matter_where_the_motion_turns_it_up(human):
+    """As of a root that turns X-up bones: what counts is how the body stands."""
+    turn = Rotation.from_euler("y", 90, degrees=True)
+    lying = turned(still(human, -1), turn)
+    assert vertical_axis(lying) == "x"
+    root = turn.inv() * Rotation.from_quat(lying.rotations[:, 0], scalar_first=True)
+    rotations = lying.rotations.copy()
+    rotations[:, 0] = root.as_quat(scalar_first=True)
+    assert vertical_axis(dataclasses.replace(lying, rotations=rotations)) is None
+
+
 def test_a_skeleton_that_is_no_body_says_nothing():
     assert vertical_axis(two_bones([[[1.0, 0, 0, 0], [1.0, 0, 0, 0]]])) is None
 

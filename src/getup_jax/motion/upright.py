@@ -18,7 +18,7 @@ _LOOKS = 300  # frames that are looked at
 # The lowest joint stays on the floor: its height varies by less than the first, in leg lengths,
 # and what is no height by more than the second.
 _FLOOR, _NO_FLOOR = 0.2, 0.4
-_STANDS, _MOSTLY = 0.1, 0.5  # shares of the frames
+_STANDS = 0.1  # share of the frames
 
 
 def vertical_axis(recording: Recording) -> str | None:
@@ -52,7 +52,7 @@ def _seen(recording: Recording) -> Recording:
 
 
 def _by_motion(recording: Recording, links: Mapping[str, int], upright: list[str]) -> str | None:
-    """The axis along which the body stands on a floor, or mostly is as in a zero pose that stands.
+    """The axis along which the body stands on a floor, or is as in the zero pose.
 
     A body that stays still may stand along one axis as well as lie along another.
     """
@@ -74,4 +74,5 @@ def _by_motion(recording: Recording, links: Mapping[str, int], upright: list[str
         other = "z" if name == "y" else "y"
         if share[name] > _STANDS and varies[name] < _FLOOR and varies[other] > _NO_FLOOR:
             return name
-    return next((name for name in upright if share[name] > _MOSTLY), None)
+    likely = (n for n in upright if share[n] > _STANDS and varies[n] <= varies["y"])
+    return next(likely, None)
