@@ -1,7 +1,7 @@
 """How well a policy obeys edits of its curves, and how well a search around it does.
 
     python benchmarks/style_control.py [POLICY] [--curves FILE ...] [--only STYLE ...] [--edits 8]
-        [--bound N] [--seed 0] [--json FILE]
+        [--bound N] [--seed 0] [--json FILE] [--quick]
 
 POLICY: a run folder, a checkpoint or the name of a shipped policy (default: flat). Each of its
 styles, or those of curve files, is followed as it is and with random edits of its inner control
@@ -28,6 +28,7 @@ from getup_jax.nets import prior as pose_prior
 from getup_jax.progress import Display
 from getup_jax.search.follow import bound
 from getup_jax.tasks.build import build_task
+from support.command import command
 
 
 def main() -> None:
@@ -41,11 +42,9 @@ def main() -> None:
     parser.add_argument("--bound", type=positive, metavar="N")
     parser.add_argument("--seed", type=natural, default=0, metavar="S")
     parser.add_argument("--json", type=output(".json"), metavar="FILE")
+    parser.add_argument("--quick", action="store_true", help="one edit of one style")
     args = parser.parse_args()
-    try:
-        results = run(args)
-    except ValueError as error:  # of the user's making: a setting, a curve, a checkpoint
-        raise SystemExit(f"{type(error).__name__}: {error}") from None
+    results = run(args)
     print(control_gain.table(results))
     if args.json is not None:
         write(args.json, results)
@@ -62,6 +61,8 @@ def run(args: argparse.Namespace) -> dict[str, ControlGain]:
     task = build_task(config, print, prior, choose)
     learner, policy = restore_policy(config, loaded, task)
     styles = numbers(args.only, task.getups)
+    if args.quick:
+        styles, args.edits = styles[:1], 1
     results = {}
     for name, how, edits in ((args.policy, measure, args.edits), ("search", bound, args.bound)):
         if edits is not None:
@@ -95,4 +96,4 @@ def write(file: Path, results: dict[str, ControlGain]) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command(main)
