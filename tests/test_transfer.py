@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 
 import jax
 import jax.numpy as jnp
@@ -21,7 +22,7 @@ from getup_jax.tasks.actions import Units
 from getup_jax.tasks.build import BuiltTask
 from getup_jax.tasks.observation import Observer
 from getup_jax.tasks.symmetry import find_symmetry
-from getup_jax.transfer import Origin, carry_over
+from getup_jax.transfer import Teacher, carry_over, make_teacher
 
 KEY = jax.random.PRNGKey(0)
 CONFIG = dataclasses.replace(
@@ -69,25 +70,41 @@ def test_the_latent_is_that_of_the_old_pose_and_not_of_the_offsets(task, old):
     np.testing.assert_allclose(moved[:, 16:], 2.0 * action[:, 16:], atol=1e-5)
 
 
+def teacher_of(learner: Learner, policy: PolicyState, units: Units) -> Teacher:
+    return Teacher(
+        learner.model, policy, units, learner.env.observer, learner.env.config.lookahead_s
+    )
+
+
+def quickly(monkeypatch, rounds: int = 1) -> None:
+    """Few and small lessons."""
+    monkeypatch.setattr(transfer, "_ROUNDS", rounds)
+    monkeypatch.setattr(lessons, "_EPOCHS", 60)
+    monkeypatch.setattr(lessons, "_MINIBATCH", 64)
+
+
+def differences(log: list[str]) -> tuple[float, float, float]:
+    """Degrees after and before, and |dq|_1, of the last round."""
+    after, before, offsets = (float(x) for x in re.findall(r"[0-9]+\.[0-9]+", log[-1]))
+    return after, before, offsets
+
+
 def test_an_action_that_means_the_same_leaves_the_policy_alone(task):
     learner, policy = make_policy(task, CONFIG)
-    settings, log = CONFIG.task, []
-    same = carry_over(
-        learner, task.world, policy, Origin(settings, task.world.prior), KEY, log.append
-    )
-    assert same is policy
+    log: list[str] = []
+    teacher = teacher_of(learner, policy, learner.env.units(task.world))
+    own = learner.init_learner(jax.random.PRNGKey(1)).policy
+    assert carry_over(learner, task.world, own, teacher, KEY, log.append) is policy
     assert log == []
 
 
 def test_the_actor_learns_the_old_targets(task, old, monkeypatch):
-    monkeypatch.setattr(transfer, "_ROLLOUTS", 8)
-    monkeypatch.setattr(lessons, "_EPOCHS", 60)
-    monkeypatch.setattr(lessons, "_MINIBATCH", 64)
+    quickly(monkeypatch)
     learner, policy = make_policy(task, CONFIG)
-    settings = dataclasses.replace(CONFIG.task, offset_scale=old.offset_scale)
     log: list[str] = []
-    taught = carry_over(learner, task.world, policy, Origin(settings, old.prior), KEY, log.append)
-    after, before, _ = (float(word) for word in log[-1].split() if word[0].isdigit())
+    teacher = teacher_of(learner, policy, old)
+    taught = carry_over(learner, task.world, policy, teacher, KEY, log.append)
+    after, before, _ = differences(log)
     assert after < 0.3 * before
     block = learner.env.observer.slices()["action"]
     kept = np.ones(learner.env.observation_size, bool)
@@ -98,19 +115,16 @@ def test_the_actor_learns_the_old_targets(task, old, monkeypatch):
         assert (a[block] != b[block]).any()
 
 
-def test_offsets_are_avoided_where_latents_can_say_the_same(task, monkeypatch):
-    monkeypatch.setattr(transfer, "_ROLLOUTS", 8)
-    monkeypatch.setattr(lessons, "_EPOCHS", 60)
-    monkeypatch.setattr(lessons, "_MINIBATCH", 64)
+def test_offsets_are_avoided_where_latents_can_say_the_same(task, old, monkeypatch):
+    quickly(monkeypatch)
     learner, policy = make_policy(task, CONFIG)
     lengths = []
     for weight in (0.0, 1.0):
         monkeypatch.setattr(lessons, "_NATURAL", weight)
         log: list[str] = []
-        settings = dataclasses.replace(CONFIG.task, offset_scale=0.5)
-        prior = untrained_prior(task.environment.character, seed=0)
-        carry_over(learner, task.world, policy, Origin(settings, prior), KEY, log.append)
-        lengths.append(float(log[-1].split()[-2]))
+        teacher = teacher_of(learner, policy, old)
+        carry_over(learner, task.world, policy, teacher, KEY, log.append)
+        lengths.append(differences(log)[2])
     assert lengths[1] < 0.7 * lengths[0]
 
 
@@ -155,20 +169,18 @@ def observed(policy: PolicyState, learner: Learner, seed: int = 0) -> PolicyStat
 def test_a_policy_is_taught_to_networks_with_and_without_mirror_images(
     mirrored, was_mirrored, monkeypatch
 ):
-    monkeypatch.setattr(transfer, "_ROLLOUTS", 8)
-    monkeypatch.setattr(lessons, "_EPOCHS", 60)
-    monkeypatch.setattr(lessons, "_MINIBATCH", 64)
+    quickly(monkeypatch)
     configs = (CONFIG, plain()) if was_mirrored else (plain(), CONFIG)
-    (teacher, policy), (learner, _) = (make_policy(mirrored, config) for config in configs)
-    policy = observed(policy, teacher)
+    (taught_before, policy), (learner, own) = (make_policy(mirrored, c) for c in configs)
+    policy = observed(policy, taught_before)
     kernel = 0.1 * jax.random.normal(KEY, policy.actor["params"]["output"]["kernel"].shape)
     output = {**policy.actor["params"]["output"], "kernel": kernel}
     actor = {**policy.actor, "params": {**policy.actor["params"], "output": output}}
     policy = dataclasses.replace(policy, actor=actor)
-    start = Origin(CONFIG.task, mirrored.world.prior, teacher.model.symmetry)
+    teacher = teacher_of(taught_before, policy, learner.env.units(mirrored.world))
     log: list[str] = []
-    taught = carry_over(learner, mirrored.world, policy, start, KEY, log.append)
-    after, before, _ = (float(word) for word in log[-1].split() if word[0].isdigit())
+    taught = carry_over(learner, mirrored.world, own, teacher, KEY, log.append)
+    after, before, _ = differences(log)
     assert after < 0.5 * before
     if not was_mirrored:
         image = mirrored.environment.symmetry.observation
@@ -180,50 +192,110 @@ def loaded_from(folder, task: BuiltTask, config: Config) -> LoadedPolicy:
 
 
 def test_what_a_checkpoint_was_trained_with_is_read_off_it(tmp_path, mirrored, task):
-    learner, _ = make_policy(mirrored, CONFIG)
-    both = loaded_from(tmp_path / "both", mirrored, CONFIG)
-    assert transfer.origin(learner, mirrored.world, both, whole=True).symmetry is not None
+    learner, own = make_policy(mirrored, CONFIG)
     free = dataclasses.replace(CONFIG, network=plain().network)
-    for config, built in ((free, mirrored), (plain(), task), (CONFIG, task)):
-        loaded = loaded_from(tmp_path / f"{config.network.mirror} {built is task}", built, config)
-        start = transfer.origin(learner, mirrored.world, loaded, whole=False)
-        assert start.symmetry is None
-        assert start.prior.mirrored == built.prior.mirrored
+    cases = (CONFIG, mirrored, True), (free, mirrored, False), (plain(), task, False)
+    for number, (config, built, expected) in enumerate(cases):
+        loaded = loaded_from(tmp_path / f"case {number}", built, config)
+        teacher = make_teacher(CONFIG, learner, mirrored.world, loaded, own)
+        assert (teacher.model.symmetry is not None) == expected
+        assert teacher.fits(learner) == expected
+        assert teacher.units.prior.mirrored == built.prior.mirrored
+        jax.tree.map(np.testing.assert_array_equal, teacher.policy.actor, loaded.policy["actor"])
 
 
-def test_a_critic_is_not_taught(tmp_path, mirrored, task):
-    learner, _ = make_policy(mirrored, CONFIG)
-    old = loaded_from(tmp_path, task, plain())
+def resumed(config: Config) -> Config:
+    return dataclasses.replace(
+        config, train=dataclasses.replace(config.train, init_from="x", init_learner=True)
+    )
+
+
+def test_a_learner_goes_on_only_with_its_own_networks(tmp_path, mirrored, task):
+    learner, own = make_policy(mirrored, CONFIG)
+    old = loaded_from(tmp_path / "old", task, plain())
     expected = (
         r"network\.mirror is false there; expected the same here with train\.init_learner; "
         r"set network\.mirror=false prior\.mirror=false"
     )
     with pytest.raises(CheckpointError, match=expected):
-        transfer.origin(learner, mirrored.world, old, whole=True)
-    other, _ = make_policy(task, plain())
+        make_teacher(resumed(CONFIG), learner, mirrored.world, old, own)
+    other, other_own = make_policy(task, plain())
     new = loaded_from(tmp_path / "new", mirrored, CONFIG)
     with pytest.raises(CheckpointError, match=r"set network\.mirror=true prior\.mirror=true"):
-        transfer.origin(other, task.world, new, whole=True)
+        make_teacher(resumed(plain()), other, task.world, new, other_own)
 
 
-def test_without_a_prior_nothing_is_taught(tmp_path, mirrored):
-    env = mirrored.environment
+def without_prior(task: BuiltTask) -> BuiltTask:
+    env = task.environment
     observer = Observer.of(env.character, 4, 49)
     symmetry = find_symmetry(CONFIG, env.character, observer, None)
     env = dataclasses.replace(env, observer=observer, symmetry=symmetry, latent_size=0)
-    bare = BuiltTask(env, mirrored.world.replace(prior=None), None, mirrored.getups)
-    config = dataclasses.replace(CONFIG, prior=None)
-    learner, policy = make_policy(bare, config)
+    return BuiltTask(env, task.world.replace(prior=None), None, task.getups)
+
+
+def test_a_policy_without_a_prior_is_taught_as_well(tmp_path, mirrored, monkeypatch):
+    quickly(monkeypatch)
+    bare, config = without_prior(mirrored), dataclasses.replace(CONFIG, prior=None)
+    learner, own = make_policy(bare, config)
     for saved in (config, plain(config)):
+        _, policy = make_policy(bare, saved)
         folder = tmp_path / str(saved.network.mirror)
-        item = {"policy": policy, "prior": None}
-        save_learner(folder / CHECKPOINTS, 1, policy, saved, item, {})
-        if saved.network.mirror:
-            assert transfer.origin(learner, bare.world, load_policy(folder), False).prior is None
-            continue
-        with pytest.raises(CheckpointError, match=r"pose prior; set network\.mirror=false$"):
-            transfer.origin(learner, bare.world, load_policy(folder), whole=False)
-    with pytest.raises(CheckpointError, match="was trained without a pose prior"):
-        transfer.origin(
-            make_policy(mirrored, CONFIG)[0], mirrored.world, load_policy(folder), False
-        )
+        save_learner(folder / CHECKPOINTS, 1, policy, saved, {"policy": policy, "prior": None}, {})
+        log: list[str] = []
+        teacher = make_teacher(config, learner, bare.world, load_policy(folder), own)
+        carry_over(learner, bare.world, own, teacher, KEY, log.append)
+        assert bool(log) != saved.network.mirror
+
+
+def test_with_and_without_a_prior_are_two_kinds_of_policies(tmp_path, mirrored):
+    bare, config = without_prior(mirrored), dataclasses.replace(CONFIG, prior=None)
+    _, policy = make_policy(bare, config)
+    save_learner(tmp_path / CHECKPOINTS, 1, policy, config, {"policy": policy, "prior": None}, {})
+    learner, own = make_policy(mirrored, CONFIG)
+    with pytest.raises(CheckpointError, match="without a pose prior, this run has one; set"):
+        make_teacher(CONFIG, learner, mirrored.world, load_policy(tmp_path), own)
+    loaded = loaded_from(tmp_path / "with", mirrored, CONFIG)
+    learner, own = make_policy(bare, config)
+    with pytest.raises(CheckpointError, match="trained with a pose prior, this run has none"):
+        make_teacher(config, learner, bare.world, loaded, own)
+
+
+# --- another observation
+
+
+LONGER = dataclasses.replace(
+    CONFIG,
+    network=dataclasses.replace(CONFIG.network, hidden_sizes=(48, 32)),
+    task=dataclasses.replace(CONFIG.task, lookahead_s=(0.0, 0.05, 0.1, 0.2, 0.3, 0.8)),
+)
+
+
+def test_networks_of_other_sizes_that_see_more_of_the_curve_are_taught(tmp_path, task, monkeypatch):
+    quickly(monkeypatch, rounds=2)
+    loaded = loaded_from(tmp_path, task, CONFIG)
+    built = make_task(LONGER)
+    learner, own = make_policy(built, LONGER)
+    teacher = make_teacher(LONGER, learner, built.world, loaded, own)
+    log: list[str] = []
+    teacher = dataclasses.replace(teacher, policy=observed(teacher.policy, make_policy(task)[0]))
+    taught = carry_over(learner, built.world, own, teacher, KEY, log.append)
+    after, before, _ = differences(log)
+    assert len(log) == 3
+    assert after < before
+    # What both see has the statistics of the old one.
+    old, new = teacher.policy.statistics.mean, taught.statistics.mean
+    block = learner.env.observer.slices()["targets"]
+    kept = [0, 1, 2, 6, 7, 8, 9, 10, 11, 12, 13, 14]
+    np.testing.assert_array_equal(new[block][np.array(kept)], old[block.start : block.start + 12])
+    np.testing.assert_array_equal(new[: block.start], old[: block.start])
+
+
+def test_what_the_old_policy_saw_must_be_there(tmp_path, task):
+    loaded = loaded_from(tmp_path, task, CONFIG)
+    short = dataclasses.replace(
+        CONFIG, task=dataclasses.replace(CONFIG.task, lookahead_s=(0.0, 0.1))
+    )
+    built = make_task(short)
+    learner, own = make_policy(built, short)
+    with pytest.raises(CheckpointError, match=r"sees the curve 0\.2, 0\.3 s ahead; expected these"):
+        make_teacher(short, learner, built.world, loaded, own)

@@ -56,7 +56,8 @@ def teach_footing(
         return Lesson(observation, action, units.target(action, condition), condition)
 
     plane = dataclasses.replace(env, terrain=dataclasses.replace(env.terrain, **_FLAT_ONLY))
-    own = lessons.watched(learner, plane, world, policy, as_it_is, _OWN, keys[0])
+    act = functools.partial(learner.act, policy)
+    own = lessons.watched(learner, plane, world, act, as_it_is, _OWN, keys[0])
     anywhere = dataclasses.replace(env, terrain=dataclasses.replace(env.terrain, **_ALL_OPEN))
     stretched = _stretched(env)
 
@@ -64,7 +65,7 @@ def teach_footing(
         lesson = as_it_is(observation)
         return lesson.replace(target=stretched(lesson.target, lesson.condition))
 
-    rising = lessons.watched(learner, anywhere, world, policy, head_up, _RISING, keys[2])
+    rising = lessons.watched(learner, anywhere, world, act, head_up, _RISING, keys[2])
     low = np.asarray(rising.condition[:, 0]) < _RISES * float(np.max(world.points[:, -1, 0]))
     rising = jax.tree.map(lambda x: x[low], rising)
     held = [_held(learner, env, world, k) for k in keys[3:]]

@@ -46,19 +46,26 @@ def watched(
     learner: Learner,
     env: GetUpTask,
     world: World,
-    policy: PolicyState,
+    mean_action: Callable[[jax.Array], jax.Array],
     lesson: Callable[[jax.Array], Lesson],
     rollouts: int,
     key: jax.Array,
 ) -> Lesson:
-    """Lessons from what the policy sees in rollouts that go on from one to the next.
+    """Lessons from what a policy sees in rollouts that go on from one to the next.
 
-    lesson: of raw observations [N, O] of `env`, inside jit.
+    Args:
+        learner: whose numbers of simulations and steps a rollout has.
+        env: where the policy acts.
+        world: of `env`.
+        mean_action: [N, A] of the policy for raw observations [N, O] of `env`, inside jit.
+        lesson: of raw observations [N, O] likewise.
+        rollouts: how many.
+        key: of the starts and the noise.
     """
     num_envs, num_steps = learner.config.num_envs, learner.config.num_steps
 
     def act(observation: jax.Array, key_action: jax.Array) -> tuple[jax.Array, jax.Array]:
-        mean = learner.act(policy, observation)
+        mean = mean_action(observation)
         std = jnp.full_like(mean, _NOISE)
         action = gaussian.sample(key_action, mean, std)
         return action, gaussian.log_prob(action, mean, std)
@@ -101,6 +108,8 @@ def taught(
         action = learner.model.mean(actor, seen)
         miss = jnp.mean(jnp.square(units.target(action, part.condition) - part.target))
         (latent, offset), (near, _) = (jnp.split(a, [latents], -1) for a in (action, part.action))
+        if units.prior is None:
+            return miss, {"miss": miss}
         far = jnp.mean(jnp.square(latent - near))
         unnatural = jnp.mean(1.0 - rewards.natural(units.offset_scale * offset, limit))
         return miss + _NEAR * far + _NATURAL * unnatural, {"miss": miss}

@@ -38,7 +38,8 @@ class Job:
     learner: Any  # init(world, key) -> state, iteration(world, state) -> (state, metrics)
     world: Any  # pytree of arrays that every iteration reads
     prior: Any  # pytree saved beside the policy, or None
-    # (policy, its checkpoint, log) -> the policy as this job means it; None: as it is
+    # (the run's policy, the checkpoint to begin with, log) -> the policy as this job means it;
+    # None: the checkpoint's, as it is
     carry_over: CarryOver | None = None
     # (environment, another's by name, its path) -> with what is not of single simulations
     share: Callable[[Any, Any, str], Any] | None = None
@@ -106,15 +107,15 @@ class Loop:
 
     def _load_policy(self, path: str) -> None:
         loaded = checkpoint.load_policy(path)
-        learner = self._state.learner
-        policy = from_nested(learner.policy, loaded.policy, str(loaded.path))
         self._display.log(f"starting with the policy of {loaded.path}")
         warn_if_other(loaded.path, loaded.metadata, self._job.body, self._display.log)
         if self._config.train.init_learner:
             self._load_learner(path)
-            policy = self._state.learner.policy  # not the average of its weights
+        policy = self._state.learner.policy  # fresh, or not the average of its weights
         if self._job.carry_over is not None:
             policy = self._job.carry_over(policy, loaded, self._display.log)
+        elif not self._config.train.init_learner:
+            policy = from_nested(policy, loaded.policy, str(loaded.path))
         self._begin_with(policy, self._loaded_valuation(loaded))
 
     def _loaded_valuation(self, loaded: checkpoint.LoadedPolicy) -> Any:

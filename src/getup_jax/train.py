@@ -62,12 +62,11 @@ def build_job(config: Config, log: Log) -> Job:
 
 def _carry_over(learner: Learner, world: World, config: Config) -> CarryOver:
     def carry_over(policy: PolicyState, loaded: LoadedPolicy, log: Log) -> PolicyState:
-        origin = transfer.origin(learner, world, loaded, config.train.init_learner)
-        if world.prior is None:
-            return policy
+        teacher = transfer.make_teacher(config, learner, world, loaded, policy)
         key = jax.random.PRNGKey(config.seed)
-        policy = transfer.carry_over(learner, world, policy, origin, key, log)
-        if learner.env.terrain is None or loaded.config.terrain is not None:
+        policy = transfer.carry_over(learner, world, policy, teacher, key, log)
+        on_plane = learner.env.terrain is None or loaded.config.terrain is not None
+        if world.prior is None or on_plane:
             return policy
         return teach_footing(learner, world, policy, key, log)
 

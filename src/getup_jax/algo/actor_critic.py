@@ -1,8 +1,8 @@
 """The actor and the critic with the normalisation around them.
 
-Where the environment has a mirror image M, both are equivariant by construction: each of the
-networks f is averaged over an observation and its image, (f(o) + M f(M o)) / 2, and what the
-observations are normalised by are the statistics of both together.
+Where the environment has a mirror image, both are equivariant by construction, see
+nets/equivariant.py, and what the observations are normalised by are the statistics of observations
+and images together.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from getup_jax.algo.state import LearnerState, PolicyState
 from getup_jax.algo.update import ACTOR_EPSILON, first_scale, make_optimiser
 from getup_jax.config import NetworkConfig, PPOConfig
 from getup_jax.mirror import SignedPermutation, Symmetry, concatenated, signed
+from getup_jax.nets.equivariant import EquivariantMLP
 from getup_jax.nets.mlp import MLP
 from getup_jax.nets.recurrent import HistoryMLP
 from getup_jax.types import Environment
@@ -34,7 +35,7 @@ META_LOGIT = 2.0
 # last would hardly move them.
 MEMORY_STEPS = 1e7
 
-Network = MLP | HistoryMLP
+Network = MLP | HistoryMLP | EquivariantMLP
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,12 +45,12 @@ class ActorCritic:
     actor: Network  # to the mean action [A]; with its log std [2 A] where `initial_std` is given
     critic: Network  # to K outputs
     observation_size: int  # O
+    num_objectives: int  # K
     initial_std: float | None = None  # None: the std is a setting, not the actor's
     std_range: float = 2.0  # bounds of the actor's log std, in e-folds around the first one
     # A where the observation ends in a meta policy's action, which only the mean gets, else 0
     meta_size: int = 0
-    symmetry: Symmetry | None = None  # of raw observations; None: the networks as they are
-    normalized: bool = True  # whether the networks see normalised observations
+    symmetry: Symmetry | None = None  # of raw observations, to which the networks are equivariant
 
     def init(self, key: jax.Array, config: PPOConfig) -> LearnerState:
         """Fresh variables, and the statistics that the settings ask for."""
@@ -66,7 +67,7 @@ class ActorCritic:
             average=actor,
             actor_optimiser=optimiser.init(actor),
             critic_optimiser=optimiser.init(critic),
-            popart=popart.initial(self.critic.output_size) if config.popart else None,
+            popart=popart.initial(self.num_objectives) if config.popart else None,
             learning_rate_scale=first_scale(config.target_clip_fraction),
         )
 
@@ -100,36 +101,15 @@ class ActorCritic:
     ) -> tuple[jax.Array, jax.Array | None, jax.Array | None]:
         """The actor's own mean, log std and meta weight [..., A]; None where it has none."""
         has_std, has_meta = self.initial_std is not None, self.meta_size > 0
-        image = None
-        if self.symmetry is not None:
-            action = self.symmetry.action
-            image = concatenated([action] + (has_std + has_meta) * [action.unsigned()])
-        output = self._apply(self.actor, actor, normalized, image)
+        output: Any = self.actor.apply(actor, normalized[..., : self.observation_size])
         parts = jnp.split(output, 1 + has_std + has_meta, axis=-1)
         weight = nn.sigmoid(parts[-1] + META_LOGIT) if has_meta else None
         return parts[0], parts[1] if has_std else None, weight
 
     def output(self, critic: Any, normalized: jax.Array) -> jax.Array:
         """Critic outputs [..., K] in the critic's units for normalised observations [..., O]."""
-        image = None if self.symmetry is None else signed([1.0] * self.critic.output_size)
-        return self._apply(self.critic, critic, normalized, image)
-
-    def _apply(
-        self,
-        network: Network,
-        variables: Any,
-        normalized: jax.Array,
-        image: SignedPermutation | None,
-    ) -> jax.Array:
-        """Outputs [..., N] of a network, averaged over both images; `image` is the outputs'."""
-        seen: Any = normalized[..., : self.observation_size]
-        if self.symmetry is None or image is None:
-            output: Any = network.apply(variables, seen)
-            return output
-        mirror = self.symmetry.observation
-        mirror = mirror.linear() if self.normalized else mirror
-        both: Any = network.apply(variables, mirror.stacked(seen))
-        return image.averaged(both)
+        output: Any = self.critic.apply(critic, normalized[..., : self.observation_size])
+        return output
 
     def symmetric(self, policy: PolicyState) -> PolicyState:
         """The policy with statistics [O] of the observations and their mirror images."""
@@ -154,25 +134,35 @@ def make_actor_critic(
     normalized: whether the observations are, `ppo.normalize_observation`.
     """
     meta_size: int = getattr(env, "meta_size", 0)
-    symmetry: Symmetry | None = getattr(env, "symmetry", None)
+    symmetry: Symmetry | None = getattr(env, "symmetry", None) if config.mirror else None
     heads = 1 + (config.initial_std is not None) + (meta_size > 0)
+    actor_image = critic_image = None
+    if symmetry is not None:
+        action = symmetry.action
+        actor_image = concatenated([action] + (heads - 1) * [action.unsigned()])
+        critic_image = signed([1.0] * env.num_objectives)
+    seen = None if symmetry is None else symmetry.observation
+    if seen is not None and normalized:
+        seen = seen.linear()  # the offset went with the statistics' mean
+
+    def network(outputs: int, scale: float, image: SignedPermutation | None) -> Network:
+        """With a GRU in front where the environment's observation starts with frames."""
+        if seen is not None and image is not None:
+            return EquivariantMLP(config.hidden_sizes, seen, image, config.activation, scale)
+        shape = (config.hidden_sizes, outputs, config.activation, scale)
+        frames: tuple[int, int] | None = getattr(env, "frames", None)
+        return MLP(*shape) if frames is None else HistoryMLP(*frames, config.gru_size, *shape)
+
     return ActorCritic(
-        actor=_network(env, config, heads * env.action_size, ACTOR_OUTPUT_SCALE),
-        critic=_network(env, config, env.num_objectives, 1.0),
+        actor=network(heads * env.action_size, ACTOR_OUTPUT_SCALE, actor_image),
+        critic=network(env.num_objectives, 1.0, critic_image),
         observation_size=env.observation_size - meta_size,
+        num_objectives=env.num_objectives,
         initial_std=config.initial_std,
         std_range=config.std_range,
         meta_size=meta_size,
-        symmetry=symmetry if config.mirror else None,
-        normalized=normalized,
+        symmetry=symmetry,
     )
-
-
-def _network(env: Environment, config: NetworkConfig, outputs: int, scale: float) -> Network:
-    """With a GRU in front where the environment's observation starts with frames."""
-    shape = (config.hidden_sizes, outputs, config.activation, scale)
-    frames: tuple[int, int] | None = getattr(env, "frames", None)
-    return MLP(*shape) if frames is None else HistoryMLP(*frames, config.gru_size, *shape)
 
 
 def normalized(policy: PolicyState, observation: jax.Array) -> jax.Array:

@@ -33,7 +33,7 @@ class Units:
         """
         if self.prior is None:
             assert self.neutral is not None
-            return self.neutral
+            return jnp.broadcast_to(self.neutral, (*action.shape[:-1], self.neutral.size))
         return pose_prior.decode_action(self.prior, action[..., : self.latent_size], condition)
 
     def target(self, action: jax.Array, condition: jax.Array) -> jax.Array:
