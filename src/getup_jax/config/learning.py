@@ -16,8 +16,8 @@ class NetworkConfig:
     hidden_sizes: tuple[int, ...] = number((256, 256), least=1, most=4096, length=(0, 8))
     activation: str = "relu"  # relu | tanh | elu | silu | relu6
     # what is done in the mirror image of a state is the mirror image of what is done in the state,
-    # by construction, see nets/equivariant.py: units come in pairs, and a layer has half the weights;
-    # where the task has a mirror image, which composite motion has not
+    # by construction (units come in pairs, and a layer has half of the weights); where the task has
+    # a mirror image, which composite motion has not
     mirror: bool = True
     # GRU in front of both, where the task observes a history of frames
     gru_size: int = number(256, least=1, most=4096)
