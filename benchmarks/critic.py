@@ -19,15 +19,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax import checkpoint
-from getup_jax.algo.actor_critic import normalized
-from getup_jax.algo.gae import gae
-from getup_jax.algo.learner import Learner
 from getup_jax.config import Config
-from getup_jax.nets import gaussian
-from getup_jax.settings import load_saved_config
-from getup_jax.storage import from_nested
-from getup_jax.train import build_job
+from getup_jax.config.load import load_saved_config
+from getup_jax.networks import gaussian
+from getup_jax.rl.actor_critic import normalized
+from getup_jax.rl.gae import gae
+from getup_jax.rl.learner import Learner
+from getup_jax.runtime import checkpoint
+from getup_jax.runtime.pytree_store import from_nested
+from getup_jax.training.run import build_job
 
 PHASES = ((0.0, 0.25), (0.25, 0.5), (0.5, 0.75), (0.75, 1.0), (1.0, np.inf))
 

@@ -19,11 +19,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.algo.meta_chain import with_meta
-from getup_jax.composite.episodes import without_noise
-from getup_jax.rehearsal import clip_targets
-from getup_jax.settings import load_config
-from getup_jax.tasks.build_composite import build_composite
+from getup_jax.config.load import load_config
+from getup_jax.envs.composite.build import build_composite
+from getup_jax.envs.composite.meta.chain import with_meta
+from getup_jax.evaluation.composite_rollout import without_noise
+from getup_jax.imitation.dagger import clip_targets
 from support.command import command
 
 SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)

@@ -20,15 +20,16 @@ from typing import Any
 
 import numpy as np
 
-from getup_jax import checkpoint, evaluate
-from getup_jax.composite.episodes import restore, run_composite
-from getup_jax.composite.evaluate import imitation_errors
-from getup_jax.conditions import Conditions
-from getup_jax.eval_options import eval_parser
-from getup_jax.progress import Display
-from getup_jax.scores import episode_values
-from getup_jax.settings import load_config
-from getup_jax.train import run
+from getup_jax.config.load import load_config
+from getup_jax.evaluation import getup
+from getup_jax.evaluation.composite import imitation_errors
+from getup_jax.evaluation.composite_rollout import restore, run_composite
+from getup_jax.evaluation.metrics import episode_values
+from getup_jax.evaluation.options import eval_parser
+from getup_jax.evaluation.scenario import Conditions
+from getup_jax.runtime import checkpoint
+from getup_jax.runtime.console import Display
+from getup_jax.training.run import run
 
 # the networks of the shipped policies, no help, and the noise of a run's end
 _GETUP = (
@@ -103,10 +104,10 @@ def getup_values(path: str, episodes: int) -> Values:
     """Return rate, success and errors of a get-up policy's episodes."""
     args = eval_parser().parse_args(["--ckpt", path, "--episodes", str(episodes)])
     loaded = checkpoint.load_policy(path)
-    config = evaluate.evaluation_config(loaded.config, args)
+    config = getup.evaluation_config(loaded.config, args)
     with Display(episodes, unit="episodes") as display:
         conditions = Conditions.of(args)
-        played, _ = evaluate.evaluate(config, loaded, conditions, episodes, display)
+        played, _ = getup.evaluate(config, loaded, conditions, episodes, display)
     control_dt = played.task.environment.engine.control_dt
     values = episode_values(played.trace, control_dt, config.task.stand_time_s)
     losses = {name: -values[name] for name in ("height_error_m", "angle_error_rad", "jitter")}

@@ -26,7 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 from getup_jax.config import PhysicsConfig
-from getup_jax.motion.keyframes import load_authored
+from getup_jax.motion.authoring.keyframes import load_authored
 from getup_jax.physics.character import CharacterSpec, load_character
 from support.command import command, positive
 

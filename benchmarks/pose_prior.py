@@ -24,14 +24,14 @@ from rich.console import Console
 from rich.table import Table
 
 from getup_jax.config import Config
+from getup_jax.config.load import load_config
+from getup_jax.core.resources import asset_path, cache_dir
 from getup_jax.motion.library import load_motions
-from getup_jax.nets.prior_cache import cached_prior
-from getup_jax.nets.prior_data import make_pose_set, split
-from getup_jax.nets.prior_report import PriorEvaluation, evaluate_prior
-from getup_jax.nets.prior_training import PriorReport
-from getup_jax.paths import asset_path, cache_dir
 from getup_jax.physics.character import load_character
-from getup_jax.settings import load_config
+from getup_jax.pose_prior.cache import cached_prior
+from getup_jax.pose_prior.data import make_pose_set, split
+from getup_jax.pose_prior.report import PriorEvaluation, evaluate_prior
+from getup_jax.pose_prior.training import PriorReport
 from support.command import command
 
 MOST = 2000  # poses in an evaluation

@@ -6,8 +6,8 @@
 POLICY: a run folder, a checkpoint or the name of a shipped policy (default: flat). Each of its
 styles, or those of curve files, is followed as it is and with random edits of its inner control
 points; what control_gain.py says about the measure holds. --bound N also measures a search
-(search/follow.py) on N edits of each style, which takes one to two minutes an episode on two cores:
-choose few styles with --only.
+(trajectory_search/follow.py) on N edits of each style, which takes one to two minutes an episode on
+two cores: choose few styles with --only.
 """
 
 from __future__ import annotations
@@ -17,17 +17,18 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from getup_jax import checkpoint, control_gain
-from getup_jax.conditions import Conditions
 from getup_jax.config import ConfigError
-from getup_jax.control_gain import ControlGain, edit_plan, measure
-from getup_jax.eval_options import eval_parser, natural, output, positive
-from getup_jax.evaluate import Rate, chosen_styles, evaluation_config, restore_policy
+from getup_jax.envs.getup.build import build_task
+from getup_jax.evaluation import control_gain
+from getup_jax.evaluation.control_gain import ControlGain, edit_plan, measure
+from getup_jax.evaluation.getup import Rate, chosen_styles, evaluation_config, restore_policy
+from getup_jax.evaluation.options import eval_parser, natural, output, positive
+from getup_jax.evaluation.scenario import Conditions
 from getup_jax.motion.clips import GetUp
-from getup_jax.nets import prior as pose_prior
-from getup_jax.progress import Display
-from getup_jax.search.follow import bound
-from getup_jax.tasks.build import build_task
+from getup_jax.pose_prior import prior as pose_prior
+from getup_jax.runtime import checkpoint
+from getup_jax.runtime.console import Display
+from getup_jax.trajectory_search.follow import bound
 from support.command import command
 
 

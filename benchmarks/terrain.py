@@ -26,12 +26,12 @@ from rich.console import Console
 from rich.table import Table
 
 from getup_jax.config import Config, TerrainConfig
+from getup_jax.config.load import load_config
+from getup_jax.envs.getup.observation import GRID_POINTS
+from getup_jax.envs.getup.resets.rag_doll import DROPS, evenly, fall
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.settle import lift_to_ground, settle
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap, make_terrain
-from getup_jax.settings import load_config
-from getup_jax.tasks.falls import DROPS, evenly, fall
-from getup_jax.tasks.observation import GRID_POINTS
 from support.command import command, duration, positive
 
 STEPS = 10  # control steps of one round

@@ -43,9 +43,9 @@ import jax
 from rich.console import Console
 from rich.table import Table
 
-from getup_jax.algo.state import TrainState
 from getup_jax.config import Config
-from getup_jax.train import build_job
+from getup_jax.rl.state import TrainState
+from getup_jax.training.run import build_job
 from support.command import command, duration, positive
 from support.replay import Run, engine_of, raw_run
 from support.setting import make_config

@@ -16,9 +16,9 @@ import numpy as np
 from PIL import Image
 
 from getup_jax.config import ConfigError
+from getup_jax.config.load import load_config
 from getup_jax.physics.character import load_character
 from getup_jax.physics.terrain_map import TerrainMap, make_terrain
-from getup_jax.settings import load_config
 
 WIDTH, HEIGHT = 960, 640  # pixels
 AZIMUTH_DEG, ELEVATION_DEG = 115.0, -32.0

@@ -15,9 +15,9 @@ import numpy as np
 from PIL import Image
 
 from getup_jax.config import PhysicsConfig
+from getup_jax.core.resources import asset_path
+from getup_jax.motion.authoring.keyframes import clip_from_keyframes, read_keyframes
 from getup_jax.motion.clips import Clip
-from getup_jax.motion.keyframes import clip_from_keyframes, read_keyframes
-from getup_jax.paths import asset_path
 from getup_jax.physics.character import CharacterSpec, load_character
 
 FRAMES, WIDTH, HEIGHT = 8, 150, 200  # pixels of one frame

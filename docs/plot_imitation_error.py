@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from getup_jax import checkpoint
-from getup_jax.composite.episodes import make_player, policy_in, run_composite
-from getup_jax.composite.evaluate import score_composite
-from getup_jax.storage import CheckpointError
-from getup_jax.train import build_composite_job
+from getup_jax.evaluation.composite import score_composite
+from getup_jax.evaluation.composite_rollout import make_player, policy_in, run_composite
+from getup_jax.runtime import checkpoint
+from getup_jax.runtime.pytree_store import CheckpointError
+from getup_jax.training.run import build_composite_job
 
 SCORES = "imitation_error.json"
 

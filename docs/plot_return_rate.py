@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from getup_jax.metrics import read_metrics
+from getup_jax.runtime.metric_file import read_metrics
 
 METRIC, OPENED = "episode/return_rate", "rollout/regions_open"
 

@@ -3,8 +3,8 @@
     python docs/slope_starts.py --ckpt terrain [--region hard] [--rows 14] [--hand 0.5 --until 1.5]
 
 Every curve that can start in the region starts in as many rows; other rag-dolls than those of the
-training. Prints the share of episodes without an early end by the class of tasks/misfit.py, which
-is how far the neck is below the curve, in steps of 6 cm, and that of the curves on a side.
+training. Prints the share of episodes without an early end by the class of misfit.py, which is how
+far the neck is below the curve, in steps of 6 cm, and that of the curves on a side.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax import checkpoint
-from getup_jax.algo.learner import Learner
-from getup_jax.algo.state import PolicyState
-from getup_jax.conditions import orientation
 from getup_jax.config import Config, ConfigError
-from getup_jax.episodes import Roller
-from getup_jax.evaluate import evaluation_config, restore_policy
-from getup_jax.naturalness import FootPoints
-from getup_jax.nets import prior as pose_prior
+from getup_jax.envs.getup.build import BuiltTask, build_task
+from getup_jax.envs.getup.episode import LYING
+from getup_jax.envs.getup.resets import misfit
+from getup_jax.evaluation.getup import evaluation_config, restore_policy
+from getup_jax.evaluation.motion_quality import FootPoints
+from getup_jax.evaluation.rollout import Roller
+from getup_jax.evaluation.scenario import orientation
 from getup_jax.physics.terrain_map import REGIONS
-from getup_jax.tasks import misfit
-from getup_jax.tasks.build import BuiltTask, build_task
-from getup_jax.tasks.episode import LYING
+from getup_jax.pose_prior import prior as pose_prior
+from getup_jax.rl.learner import Learner
+from getup_jax.rl.state import PolicyState
+from getup_jax.runtime import checkpoint
 
 
 def main() -> None:

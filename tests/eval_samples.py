@@ -8,16 +8,16 @@ from pathlib import Path
 import jax
 from tiny_task import CONFIG, tiny_task
 
-from getup_jax.algo.learner import Learner, make_learner
-from getup_jax.algo.state import PolicyState
-from getup_jax.checkpoint import CHECKPOINTS, save_learner
-from getup_jax.conditions import Conditions, make_plan
 from getup_jax.config import Config, NetworkConfig
-from getup_jax.episodes import Episodes, run_episodes
-from getup_jax.nets.prior import to_dict
+from getup_jax.envs.getup.build import BuiltTask
+from getup_jax.evaluation.rollout import Episodes, run_episodes
+from getup_jax.evaluation.scenario import Conditions, make_plan
 from getup_jax.physics.body_digest import body_digest
 from getup_jax.physics.character import load_character
-from getup_jax.tasks.build import BuiltTask
+from getup_jax.pose_prior.prior import to_dict
+from getup_jax.rl.learner import Learner, make_learner
+from getup_jax.rl.state import PolicyState
+from getup_jax.runtime.checkpoint import CHECKPOINTS, save_learner
 
 SMALL = dataclasses.replace(
     CONFIG,

@@ -17,15 +17,15 @@ import numpy as np
 import pytest
 
 from checkpoint_samples import assert_same, make_policy, make_state
-from getup_jax import checkpoint, manifest, settings, storage
-from getup_jax.checkpoint import export_policy, load_policy, restore_learner, save_learner
-from getup_jax.config import Config
-from getup_jax.paths import asset_path
-from getup_jax.storage import CheckpointError, from_nested
+from getup_jax.config import Config, load
+from getup_jax.core.resources import asset_path
+from getup_jax.runtime import checkpoint, integrity, pytree_store
+from getup_jax.runtime.checkpoint import export_policy, load_policy, restore_learner, save_learner
+from getup_jax.runtime.pytree_store import CheckpointError, from_nested
 
 
 def save(folder: Path, iteration: int, keep: int = 2, width: int = 8) -> Path:
-    config = settings.load_config(None, [f"train.keep={keep}", "seed=5"])
+    config = load.load_config(None, [f"train.keep={keep}", "seed=5"])
     prior, critic = {"decoder": jnp.ones((2, 2))}, {"critic": jnp.full(3, 7.0)}
     item = {"policy": make_policy(iteration, width), "prior": prior, "critic": critic}
     state = make_state(iteration, width)
@@ -143,13 +143,13 @@ def remove_a_file(step: Path) -> Path:
 
 
 def remove_the_manifest(step: Path) -> Path:
-    (step / manifest.FILE).unlink()
-    return step / manifest.FILE
+    (step / integrity.FILE).unlink()
+    return step / integrity.FILE
 
 
 def break_the_manifest(step: Path) -> Path:
-    (step / manifest.FILE).write_text('{"format":')
-    return step / manifest.FILE
+    (step / integrity.FILE).write_text('{"format":')
+    return step / integrity.FILE
 
 
 DAMAGES = [truncate, flip_a_bit, remove_a_file, remove_the_manifest, break_the_manifest]
@@ -202,12 +202,12 @@ def only_policy(step: Path) -> tuple:
 
 def only_learner(step: Path) -> tuple:
     restored = restore_learner(step, make_state(0))
-    return storage.to_nested({"state": restored.state}), restored.metadata
+    return pytree_store.to_nested({"state": restored.state}), restored.metadata
 
 
 def unsealed(step: Path) -> None:
     """The manifest as it was before it covered config.yaml and itself."""
-    file = step / manifest.FILE
+    file = step / integrity.FILE
     content = json.loads(file.read_text())
     assert content.pop("content_sha256")
     assert content["files"].pop("config.yaml")
@@ -249,7 +249,7 @@ def test_a_changed_byte_is_refused_in_one_line_or_has_no_effect(run):
     whole = {read: outcome(read, step) for read in (only_policy, only_learner)}
     readers = {"policy": [only_policy], "learner": [only_learner], "config.yaml": [only_policy]}
     files, refused = small_files(step), 0
-    assert {file.relative_to(step).parts[0] for file in files} == {*readers, manifest.FILE}
+    assert {file.relative_to(step).parts[0] for file in files} == {*readers, integrity.FILE}
     for file in files:
         for _ in flips(file, 150 if file.parent == step else 20):
             for read in readers.get(file.relative_to(step).parts[0], whole):
@@ -266,7 +266,7 @@ def test_an_older_manifest_is_never_a_traceback(run, monkeypatch):
     step = run / "checkpoints" / "00000004"
     unsealed(step)
     monkeypatch.setattr(checkpoint, "read_item", lambda folder: {"policy": {}})
-    for file in (step / manifest.FILE, step / manifest.CONFIG):
+    for file in (step / integrity.FILE, step / integrity.CONFIG):
         for _ in flips(file, 100):
             found = outcome(only_policy, step)
             if isinstance(found, str):
@@ -321,9 +321,9 @@ def test_nul_bytes_in_an_older_config_say_what_to_do(run):
     ],
 )
 def test_a_manifest_of_another_form_is_damaged(run, change, problem):
-    file = run / "checkpoints" / "00000004" / manifest.FILE
-    file.write_text(json.dumps(manifest.sealed(json.loads(file.read_text()) | change)))
-    with pytest.raises(manifest.DamagedError, match=problem):
+    file = run / "checkpoints" / "00000004" / integrity.FILE
+    file.write_text(json.dumps(integrity.sealed(json.loads(file.read_text()) | change)))
+    with pytest.raises(integrity.DamagedError, match=problem):
         load_policy(file.parent)
 
 
@@ -338,8 +338,8 @@ def test_a_manifest_of_another_form_is_damaged(run, change, problem):
     ],
 )
 def test_another_format_is_an_error_and_no_damage(run, change, message):
-    file = run / "checkpoints" / "00000004" / manifest.FILE
-    file.write_text(json.dumps(manifest.sealed(json.loads(file.read_text()) | change)))
+    file = run / "checkpoints" / "00000004" / integrity.FILE
+    file.write_text(json.dumps(integrity.sealed(json.loads(file.read_text()) | change)))
     with pytest.raises(CheckpointError, match=message) as caught:
         load_policy(run)
     assert str(file) in str(caught.value)
@@ -360,7 +360,7 @@ def test_a_missing_checkpoint_is_an_error(tmp_path, make, message):
 def test_a_config_of_another_version_is_an_error(run):
     file = run / "checkpoints" / "00000004" / "config.yaml"
     file.write_text(file.read_text() + "new_part: {x: 1}\n")
-    manifest.write(file.parent, {"iteration": 4})
+    integrity.write(file.parent, {"iteration": 4})
     with pytest.raises(CheckpointError, match=r"new_part: unknown key.*version of getup_jax"):
         load_policy(run)
 
@@ -370,7 +370,7 @@ def test_a_config_of_another_version_is_an_error(run):
 
 def test_a_partial_folder_is_ignored_and_cleaned_up(run):
     folder = run / "checkpoints"
-    partial = folder / f"{manifest.PARTIAL}00000005"
+    partial = folder / f"{integrity.PARTIAL}00000005"
     shutil.copytree(folder / "00000004" / "policy", partial / "policy")
     assert restore_learner(folder, make_state(0)).metadata["iteration"] == 4
     save(folder, 6)
@@ -423,7 +423,7 @@ def test_kill_9_while_saving_costs_nothing_but_the_new_checkpoint(run):
     folder = run / "checkpoints"
     process = subprocess.run([sys.executable, "-c", KILLED, str(folder)], timeout=60, check=False)
     assert process.returncode == -9
-    assert f"{manifest.PARTIAL}00000005" in names(folder)
+    assert f"{integrity.PARTIAL}00000005" in names(folder)
     assert_same(restore_learner(folder, make_state(0)).state, make_state(4))
 
 
@@ -481,8 +481,8 @@ def test_an_export_is_at_most_5_mb(run, tmp_path, monkeypatch):
 def test_shipped_policies_load():
     for file in asset_path("checkpoints").glob("*/checkpoint.json"):
         content = json.loads(file.read_text())
-        assert content == manifest.sealed(content), "the manifest does not cover itself"
-        assert manifest.CONFIG in content["files"]
+        assert content == integrity.sealed(content), "the manifest does not cover itself"
+        assert integrity.CONFIG in content["files"]
         loaded = load_policy(file.parent)
         assert isinstance(loaded.config, Config)
-        assert storage.is_finite({"policy": loaded.policy})
+        assert pytree_store.is_finite({"policy": loaded.policy})

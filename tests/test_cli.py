@@ -3,7 +3,6 @@ from __future__ import annotations
 import importlib
 import os
 import re
-import runpy
 import subprocess
 import sys
 import tomllib
@@ -14,18 +13,18 @@ from typing import Any
 
 import pytest
 
-from getup_jax import cli, settings
-from getup_jax.config import ConfigError
-from getup_jax.paths import config_path
+from getup_jax.cli import main as cli
+from getup_jax.config import ConfigError, load
+from getup_jax.core.resources import config_path
 
 ROOT = Path(__file__).parent.parent
 
 
 class FakeTrain(types.ModuleType):
-    """getup_jax.train with a run that only notes its arguments."""
+    """getup_jax.training.run with a run that only notes its arguments."""
 
     def __init__(self) -> None:
-        super().__init__("getup_jax.train")
+        super().__init__("getup_jax.training.run")
         self.made: list[tuple[Any, ...]] = []
         self.result: int | None = None
 
@@ -39,13 +38,13 @@ def calls(tmp_path, monkeypatch) -> FakeTrain:
     """The calls of `train.run`, from an empty folder."""
     module = FakeTrain()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(sys.modules, "getup_jax.train", module)
+    monkeypatch.setitem(sys.modules, "getup_jax.training.run", module)
     return module
 
 
 def test_train_gets_settings_and_the_default_run_folder(calls, capsys):
     assert cli.train_main(["configs/quick.yaml", "seed=4"]) == 0
-    expected = settings.load_config("quick", ["seed=4"])
+    expected = load.load_config("quick", ["seed=4"])
     assert calls.made == [(expected, Path("runs/quick"), False, False)]
     assert "configs/quick.yaml into runs/quick" in capsys.readouterr().out
 
@@ -138,7 +137,7 @@ def test_a_wrong_setting_is_answered_before_anything_heavy_is_imported():
 def test_eval_passes_its_arguments_on(monkeypatch):
     seen = []
     module = types.SimpleNamespace(evaluate_command=seen.append)
-    monkeypatch.setitem(sys.modules, "getup_jax.evaluate", module)
+    monkeypatch.setitem(sys.modules, "getup_jax.evaluation.getup", module)
     assert cli.eval_main([]) == 0
     options = ["--ckpt", "runs/a", "--episodes", "7", "--seed", "3", "--json", "a.json"]
     assert cli.eval_main([*options, "--video", "a.mp4", "--engine", "mjx"]) == 0
@@ -163,7 +162,7 @@ def test_pictures_need_no_display(monkeypatch):
     # MuJoCo reads the variable when it is imported, so the command has to set it before
     monkeypatch.setattr(os, "environ", {})
     module = types.SimpleNamespace(evaluate_command=lambda _: None)
-    monkeypatch.setitem(sys.modules, "getup_jax.evaluate", module)
+    monkeypatch.setitem(sys.modules, "getup_jax.evaluation.getup", module)
     monkeypatch.setattr(sys, "platform", "linux")
     cli.eval_main([])
     assert os.environ == {}
@@ -173,7 +172,7 @@ def test_pictures_need_no_display(monkeypatch):
 
 def test_a_display_or_a_chosen_renderer_is_kept(monkeypatch):
     module = types.SimpleNamespace(evaluate_command=lambda _: None)
-    monkeypatch.setitem(sys.modules, "getup_jax.evaluate", module)
+    monkeypatch.setitem(sys.modules, "getup_jax.evaluation.getup", module)
     for given in ({"DISPLAY": ":0"}, {"MUJOCO_GL": "osmesa"}):
         monkeypatch.setattr(os, "environ", dict(given))
         cli.eval_main(["--video", "a.mp4"])
@@ -185,7 +184,7 @@ def test_eval_errors_are_clean(monkeypatch, capsys):
         raise ConfigError("physics.engine: expected one of ...")
 
     module = types.SimpleNamespace(evaluate_command=fail)
-    monkeypatch.setitem(sys.modules, "getup_jax.evaluate", module)
+    monkeypatch.setitem(sys.modules, "getup_jax.evaluation.getup", module)
     assert cli.eval_main([]) == 2
     assert capsys.readouterr().err == "ConfigError: physics.engine: expected one of ...\n"
 
@@ -201,7 +200,7 @@ def test_eval_wants_at_least_one_episode(number, capsys):
 def test_motion_passes_its_arguments_on(monkeypatch):
     seen = []
     module = types.SimpleNamespace(main=seen.append)
-    monkeypatch.setitem(sys.modules, "getup_jax.motion.command", module)
+    monkeypatch.setitem(sys.modules, "getup_jax.cli.motion", module)
     assert cli.motion_main(["list", "x"]) == 0
     assert seen == [["list", "x"]]
 
@@ -209,7 +208,7 @@ def test_motion_passes_its_arguments_on(monkeypatch):
 def test_export_passes_its_arguments_on(monkeypatch):
     seen = []
     module = types.SimpleNamespace(main=lambda argv: seen.append(argv) or 0)
-    monkeypatch.setitem(sys.modules, "getup_jax.export", module)
+    monkeypatch.setitem(sys.modules, "getup_jax.release.export", module)
     assert cli.export_main(["runs/flat", "out"]) == 0
     assert seen == [["runs/flat", "out"]]
 
@@ -227,9 +226,7 @@ def test_nothing_tells_to_import_from_the_folder_that_one_stands_in():
     told = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "src").rglob("*.py")]
     unsafe = re.compile(r"python3? -m getup_jax|executable, \"-[mc]\"")
     found = [str(file) for file in told if unsafe.search(file.read_text(encoding="utf-8"))]
-    assert [Path(file).name for file in found] == ["export.py"]  # which names the command instead
-    with pytest.raises(SystemExit, match="is the command getup-export now"):
-        runpy.run_path(str(ROOT / "src/getup_jax/export.py"), run_name="__main__")
+    assert found == []
 
 
 @pytest.mark.parametrize("main", [cli.train_main, cli.eval_main])

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from getup_jax.cli import eval_main, train_main
-from getup_jax.composite.episodes import CompositeEpisodes
-from getup_jax.composite.evaluate import score_composite
+from getup_jax.cli.main import eval_main, train_main
 from getup_jax.config import ConfigError
-from getup_jax.metrics import read_metrics
-from getup_jax.settings import load_config
-from getup_jax.tasks.build_composite import build_composite
-from getup_jax.tasks.reference_windows import link_poses
+from getup_jax.config.load import load_config
+from getup_jax.envs.composite.build import build_composite
+from getup_jax.envs.composite.reference_windows import link_poses
+from getup_jax.evaluation.composite import score_composite
+from getup_jax.evaluation.composite_rollout import CompositeEpisodes
+from getup_jax.runtime.metric_file import read_metrics
 
 SMALL = [
     "network.hidden_sizes=[8]",

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from tiny_task import getups
 
-from getup_jax.conditions import Conditions, blended, make_plan, of_config, orientation
 from getup_jax.config import Config, ConfigError, PhysicsConfig
-from getup_jax.motion.body import record
-from getup_jax.motion.bvh_writer import write_bvh
+from getup_jax.config.load import load_config
+from getup_jax.envs.getup.resets.pool import angle_gap
+from getup_jax.evaluation.scenario import Conditions, blended, make_plan, of_config, orientation
 from getup_jax.motion.clips import Clip, GetUp
+from getup_jax.motion.io.bvh_writer import write_bvh
+from getup_jax.motion.retarget.body import record
 from getup_jax.physics.character import CharacterSpec, load_character
-from getup_jax.settings import load_config
-from getup_jax.tasks.reset_pool import angle_gap
 
 MATCH_RAD = 0.52
 

@@ -10,8 +10,8 @@ import pytest
 
 import getup_jax
 from getup_jax.config import Config
-from getup_jax.paths import shipped_configs
-from getup_jax.settings import load_config
+from getup_jax.config.load import load_config
+from getup_jax.core.resources import shipped_configs
 
 PACKAGE = Path(getup_jax.__file__).parent
 

@@ -10,11 +10,18 @@ import numpy as np
 import pytest
 
 from eval_samples import make_policy, make_task
-from getup_jax import control_gain
-from getup_jax.control_gain import EDIT_STD, Responses, edit_plan, edited, measure, regress
-from getup_jax.motion import curves
-from getup_jax.motion.curves import NUM_POINTS
-from getup_jax.tasks.build import BuiltTask
+from getup_jax.envs.getup.build import BuiltTask
+from getup_jax.evaluation import control_gain
+from getup_jax.evaluation.control_gain import (
+    EDIT_STD,
+    Responses,
+    edit_plan,
+    edited,
+    measure,
+    regress,
+)
+from getup_jax.motion.getup import curves
+from getup_jax.motion.getup.curves import NUM_POINTS
 
 DT = 1 / 30
 STEPS, EDITS = 120, 40

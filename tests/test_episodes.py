@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from eval_samples import SMALL, make_policy, make_task, run
-from getup_jax import episodes
-from getup_jax.conditions import PUSH_AFTER_S, Conditions, make_plan
-from getup_jax.episodes import CHUNK, Episodes, episode_steps, run_episodes
-from getup_jax.tasks.build import BuiltTask
+from getup_jax.envs.getup.build import BuiltTask
+from getup_jax.evaluation import rollout
+from getup_jax.evaluation.rollout import CHUNK, Episodes, episode_steps, run_episodes
+from getup_jax.evaluation.scenario import PUSH_AFTER_S, Conditions, make_plan
 
 PUSHED = Conditions(start="standing", push_ns=30.0, duration_scale=(0.8, 1.2))
 
@@ -87,7 +87,7 @@ def test_overlaps_are_looked_at_once_a_chunk(calm):
 
 
 def test_batches_change_nothing(task, calm, monkeypatch):
-    monkeypatch.setattr(episodes, "BATCH", 3)  # four episodes are two batches of two
+    monkeypatch.setattr(rollout, "BATCH", 3)  # four episodes are two batches of two
     parts = run(task, dataclasses.replace(PUSHED, push_ns=None), 4)
     running = calm.trace.running
     steps = len(parts.trace.running)
@@ -98,8 +98,8 @@ def test_batches_change_nothing(task, calm, monkeypatch):
 
 
 def test_the_last_batch_is_filled_up_and_cut_again(task, monkeypatch):
-    monkeypatch.setattr(episodes, "BATCH", 2)
-    monkeypatch.setattr(episodes, "CHUNK", 30)
+    monkeypatch.setattr(rollout, "BATCH", 2)
+    monkeypatch.setattr(rollout, "CHUNK", 30)
     assert run(task, Conditions(start="standing"), 3).trace.running.shape[1] == 3
 
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from getup_jax.conditions import DROPPED
-from getup_jax.eval_options import eval_parser
+from getup_jax.evaluation.options import eval_parser
+from getup_jax.evaluation.scenario import DROPPED
 
 
 def parse(*arguments: str):

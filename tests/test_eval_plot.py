@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from eval_samples import make_task, run
-from getup_jax import eval_plot, video
-from getup_jax.conditions import Conditions
 from getup_jax.config import ConfigError
-from getup_jax.episodes import Episodes
+from getup_jax.evaluation import film, plot
+from getup_jax.evaluation.rollout import Episodes
+from getup_jax.evaluation.scenario import Conditions
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def test_the_band_is_over_the_episodes_that_run():
     features = np.zeros((4, 2, 3))
     features[:, :, 0] = [[1.0, 3.0], [2.0, 4.0], [5.0, 99.0], [99.0, 99.0]]
     running = np.array([[1, 1], [1, 1], [1, 0], [0, 0]], bool)
-    mean, low, high, left = eval_plot.band(features, running)
+    mean, low, high, left = plot.band(features, running)
     np.testing.assert_allclose(mean[:, 0], [2.0, 3.0, 5.0])
     np.testing.assert_allclose(low[:, 0], [1.2, 2.2, 5.0])
     np.testing.assert_allclose(high[:, 0], [2.8, 3.8, 5.0])
@@ -35,11 +35,11 @@ def fake_render(model, qpos, size):
 def drawn(episodes, tmp_path, monkeypatch):
     """The figure that `plot` saves."""
     pytest.importorskip("matplotlib")
-    pyplot = eval_plot.require()
+    pyplot = plot.require()
     figures = []
     monkeypatch.setattr(pyplot, "close", figures.append)
     file = tmp_path / "a.png"
-    eval_plot.plot(file, episodes)
+    plot.plot(file, episodes)
     monkeypatch.undo()
     assert file.read_bytes()[1:4] == b"PNG"
     pyplot.close(figures[0])
@@ -47,7 +47,7 @@ def drawn(episodes, tmp_path, monkeypatch):
 
 
 def test_a_column_a_style_with_target_achieved_and_pictures(episodes, tmp_path, monkeypatch):
-    monkeypatch.setattr(eval_plot, "render", fake_render)
+    monkeypatch.setattr(plot, "render", fake_render)
     figure = drawn(episodes, tmp_path, monkeypatch)
     assert len(figure.axes) == 4 * 2
     for column, style in enumerate(episodes.styles):
@@ -64,7 +64,7 @@ def test_a_column_a_style_with_target_achieved_and_pictures(episodes, tmp_path, 
 
 
 def test_without_a_renderer_the_pictures_are_left_out(episodes, tmp_path, monkeypatch):
-    monkeypatch.setattr(video, "_failures", ["no display"])
+    monkeypatch.setattr(film, "_failures", ["no display"])
     with pytest.warns(RuntimeWarning, match="--plot: without pictures: cannot render"):
         figure = drawn(episodes, tmp_path, monkeypatch)
     assert len(figure.axes) == 3 * 2
@@ -73,4 +73,4 @@ def test_without_a_renderer_the_pictures_are_left_out(episodes, tmp_path, monkey
 def test_without_matplotlib_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(ConfigError, match=r"pip install 'getup-jax\[plot\]'"):
-        eval_plot.require()
+        plot.require()

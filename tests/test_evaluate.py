@@ -7,13 +7,15 @@ import pytest
 from tiny_task import tiny_task
 
 from eval_samples import SMALL, make_task, save_policy
-from getup_jax import cli, evaluate, export
-from getup_jax.checkpoint import MAX_EXPORT_BYTES, load_policy
-from getup_jax.conditions import Conditions
-from getup_jax.export import CARD
-from getup_jax.metrics import MetricsWriter
+from getup_jax.cli import main
+from getup_jax.config.load import load_config
+from getup_jax.evaluation import getup
+from getup_jax.evaluation.scenario import Conditions
 from getup_jax.physics.character import load_character
-from getup_jax.settings import load_config
+from getup_jax.release import export
+from getup_jax.release.export import CARD
+from getup_jax.runtime.checkpoint import MAX_EXPORT_BYTES, load_policy
+from getup_jax.runtime.metric_file import MetricsWriter
 
 
 @pytest.fixture(scope="module")
@@ -39,9 +41,9 @@ def results(run_folder):
     options = ["--episodes", "3", "--start-noise", "0.05", "--duration-scale", "0.8,1.2"]
     options += ["--edits", "2"]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(evaluate, "build_task", build)
+        patch.setattr(getup, "build_task", build)
         command = ["--ckpt", str(run_folder), *options, "--stand-time", "1", "--json", str(file)]
-        assert cli.eval_main(command) == 0
+        assert main.eval_main(command) == 0
     return file
 
 
@@ -76,18 +78,18 @@ def test_eval_writes_how_much_of_its_edits_was_done(results):
 
 
 def test_edits_of_a_standing_start_are_refused(run_folder, capsys):
-    assert cli.eval_main(["--ckpt", str(run_folder), "--edits", "2", "--start", "standing"]) == 2
+    assert main.eval_main(["--ckpt", str(run_folder), "--edits", "2", "--start", "standing"]) == 2
     assert capsys.readouterr().err.startswith("ConfigError: --edits: are of the rise")
 
 
 def test_the_config_of_an_evaluation_takes_its_starts_from_the_arguments():
     config = load_config(None, ["task.start_noise_rad=0.3", "task.clip_start=0.3"])
-    args = cli.eval_parser().parse_args(["--episodes", "7", "--seed", "5"])
-    task = evaluate.evaluation_config(config, args).task
+    args = main.eval_parser().parse_args(["--episodes", "7", "--seed", "5"])
+    task = getup.evaluation_config(config, args).task
     assert (task.start_noise_rad, task.clip_start, task.stand_start) == (0.0, 0.0, 0.0)
     assert (task.pool_size, task.stand_time_s) == (7, config.task.stand_time_s)
-    args = cli.eval_parser().parse_args(["--start", "standing", "--start-noise", "0.1"])
-    task = evaluate.evaluation_config(config, args).task
+    args = main.eval_parser().parse_args(["--start", "standing", "--start-noise", "0.1"])
+    task = getup.evaluation_config(config, args).task
     assert (task.stand_start, task.start_noise_rad) == (1.0, 0.1)
     assert Conditions.of(args).kind == 1
 
@@ -97,7 +99,7 @@ def test_bodies_are_dropped_as_asked_and_not_those_of_the_training():
     config = load_config(None, settings)
 
     def task(*options: str, config=config):
-        return evaluate.evaluation_config(config, cli.eval_parser().parse_args(options)).task
+        return getup.evaluation_config(config, main.eval_parser().parse_args(options)).task
 
     plain = task()
     assert (plain.limp_share, plain.fallen_share, plain.drop_as) == (0.0, 0.0, "limp")
@@ -112,19 +114,19 @@ def test_bodies_are_dropped_as_asked_and_not_those_of_the_training():
 def test_a_policy_on_another_body_is_said_in_one_line(tmp_path, monkeypatch, capsys):
     task = make_task()
     run_folder = save_policy(tmp_path / "tiny", task, body={"masses": "another", "servos": "too"})
-    monkeypatch.setattr(evaluate, "build_task", build)
-    assert cli.eval_main(["--ckpt", str(run_folder), "--episodes", "1", "--stand-time", "1"]) == 0
+    monkeypatch.setattr(getup, "build_task", build)
+    assert main.eval_main(["--ckpt", str(run_folder), "--episodes", "1", "--stand-time", "1"]) == 0
     (line,) = [x for x in capsys.readouterr().out.splitlines() if "warning" in x]
     assert f"{run_folder}/checkpoints/00000003: was trained on a body with other " in line
 
 
 def test_how_bodies_lie_means_nothing_to_standing_starts(run_folder, capsys):
-    assert cli.eval_main(["--ckpt", str(run_folder), "--drops", "paper", "--start=standing"]) == 2
+    assert main.eval_main(["--ckpt", str(run_folder), "--drops", "paper", "--start=standing"]) == 2
     assert capsys.readouterr().err.startswith("ConfigError: --drops: says how bodies lie")
 
 
 def test_a_push_without_time_to_stand_is_refused_before_anything_is_built(run_folder, capsys):
-    assert cli.eval_main(["--ckpt", str(run_folder), "--push", "9", "--stand-time", "0.5"]) == 2
+    assert main.eval_main(["--ckpt", str(run_folder), "--push", "9", "--stand-time", "0.5"]) == 2
     captured = capsys.readouterr()
     assert captured.err.startswith("ConfigError: --push: ")
     assert captured.out == ""
@@ -132,7 +134,7 @@ def test_a_push_without_time_to_stand_is_refused_before_anything_is_built(run_fo
 
 def test_without_a_shipped_policy_the_error_says_what_to_do(monkeypatch, capsys, tmp_path):
     monkeypatch.chdir(tmp_path)
-    assert cli.eval_main(["--ckpt", "nothing"]) == 2
+    assert main.eval_main(["--ckpt", "nothing"]) == 2
     error = capsys.readouterr().err
     assert error.startswith("CheckpointError: nothing: no such folder; ")
     assert "getup-train configs/flat.yaml" in error
@@ -194,9 +196,9 @@ def test_results_of_another_policy_are_refused(run_folder, results, tmp_path, ca
     other["policy"]["steps"] = 1
     file = tmp_path / "other.json"
     file.write_text(json.dumps(other))
-    assert cli.export_main([str(run_folder), str(tmp_path / "out"), "--eval", str(file)]) == 2
+    assert main.export_main([str(run_folder), str(tmp_path / "out"), "--eval", str(file)]) == 2
     assert "evaluate what is exported" in capsys.readouterr().err
     file.write_text("{}")
-    assert cli.export_main([str(run_folder), str(tmp_path / "out"), "--eval", str(file)]) == 2
+    assert main.export_main([str(run_folder), str(tmp_path / "out"), "--eval", str(file)]) == 2
     assert "expected a file of getup-eval --json" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

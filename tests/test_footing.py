@@ -10,12 +10,12 @@ import pytest
 from ground_samples import TERRAIN
 from tiny_task import CONFIG, getups, neutral_prior
 
-from getup_jax import footing, lessons
-from getup_jax.algo.learner import make_learner
 from getup_jax.config import NetworkConfig, PPOConfig
+from getup_jax.envs.getup.build import assemble
+from getup_jax.envs.getup.resets import region_pool
+from getup_jax.imitation import action_regression, slope_warm_start
 from getup_jax.physics.character import load_character
-from getup_jax.tasks import region_pool
-from getup_jax.tasks.build import assemble
+from getup_jax.rl.learner import make_learner
 
 PPO = PPOConfig(num_envs=16, num_steps=8, minibatch_size=64)
 TASK = dataclasses.replace(CONFIG.task, pool_size=96, stand_start=0.5)
@@ -35,9 +35,9 @@ def built(tmp_path_factory):
 
 def test_held_poses_are_those_of_the_starts_and_stand(built):
     task, learner = built
-    lesson = footing._held(learner, task.environment, task.world, KEY)
+    lesson = slope_warm_start._held(learner, task.environment, task.world, KEY)
     height = np.asarray(lesson.observation)[:, task.environment.observer.slices()["features"]][:, 0]
-    assert 16 < len(height) <= 16 * footing._HOLD_STEPS // footing._LOOK_STEPS
+    assert 16 < len(height) <= 16 * slope_warm_start._HOLD_STEPS // slope_warm_start._LOOK_STEPS
     assert np.ptp(height) < 0.4
     angles = np.asarray(task.world.pool.physics.kinematics.qpos)[:, 7:]
     gap = np.abs(np.asarray(lesson.target)[:, None] - angles).max(axis=-1).min(axis=1)
@@ -45,12 +45,12 @@ def test_held_poses_are_those_of_the_starts_and_stand(built):
 
 
 def test_the_actor_learns_the_held_poses_and_keeps_the_rest(built, monkeypatch):
-    monkeypatch.setattr(lessons, "_MINIBATCH", 64)
-    monkeypatch.setattr(footing, "_HELD", 3)
+    monkeypatch.setattr(action_regression, "_MINIBATCH", 64)
+    monkeypatch.setattr(slope_warm_start, "_HELD", 3)
     task, learner = built
     policy = learner.init_learner(KEY).policy
     log: list[str] = []
-    footing.teach_footing(learner, task.world, policy, KEY, log.append)
+    slope_warm_start.teach_footing(learner, task.world, policy, KEY, log.append)
     after, before, flat, slope = (float(word) for word in log[-1].split() if word[0].isdigit())
     assert after < 0.6 * before
     assert flat < after

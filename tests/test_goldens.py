@@ -18,8 +18,8 @@ import jax
 import numpy as np
 import pytest
 
-from getup_jax.settings import load_config
-from getup_jax.train import build_composite_job, build_job
+from getup_jax.config.load import load_config
+from getup_jax.training.run import build_composite_job, build_job
 
 FILE = Path(__file__).with_name("goldens.json")
 PPO = ["ppo.num_envs=8", "ppo.num_steps=4", "ppo.minibatch_size=16", "ppo.epochs=1"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from getup_jax.config import TerrainConfig
-from getup_jax.grounds import Places, kind_of, kinds
+from getup_jax.evaluation.ground_kinds import Places, kind_of, kinds
 from getup_jax.physics.terrain_map import make_terrain
 
 CONFIG = TerrainConfig(region_size_m=16.0, slope_block_m=8.0, slope_deg=(10.0, 20.0, 45.0))

@@ -68,9 +68,9 @@ def own_parts(path: Path) -> set[str]:
 @pytest.mark.parametrize(
     ("source", "expected"),
     [
-        ("import getup_jax.algo.gae", {"getup_jax.algo.gae"}),
-        ("from getup_jax import paths as p", {"getup_jax.paths"}),
-        ("def f():\n    from getup_jax.tasks import getup", {"getup_jax.tasks.getup"}),
+        ("import getup_jax.algo.gae", {"getup_jax.rl.gae"}),
+        ("from getup_jax import paths as p", {"getup_jax.core.resources"}),
+        ("def f():\n    from getup_jax.tasks import getup", {"getup_jax.envs.getup.task"}),
         ("from . import a", {"getup_jax.nets.a"}),
         ("from ..tasks import b", {"getup_jax.tasks.b"}),
     ],

@@ -10,9 +10,9 @@ import pytest
 from rich.console import Console
 
 from getup_jax.config import ConfigError
-from getup_jax.journal import Journal, means
-from getup_jax.metrics import FILE, TIMES, MetricsError, MetricsWriter, read_metrics
-from getup_jax.progress import Display, count, describe, duration
+from getup_jax.runtime.console import Display, count, describe, duration
+from getup_jax.runtime.metric_file import FILE, TIMES, MetricsError, MetricsWriter, read_metrics
+from getup_jax.runtime.metric_log import Journal, means
 
 
 def write_lines(folder, *iterations: int, resume: int = 0, **metrics: float) -> None:

@@ -4,8 +4,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from getup_jax import mirror
-from getup_jax.mirror import SignedPermutation
+from getup_jax.core import mirror
+from getup_jax.core.mirror import SignedPermutation
 
 
 def test_a_worked_example():

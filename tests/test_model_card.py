@@ -6,10 +6,10 @@ import json
 
 import pytest
 
-from getup_jax.checkpoint import load_policy
 from getup_jax.config import ConfigError
-from getup_jax.export import CARD, export
-from getup_jax.paths import asset_path
+from getup_jax.core.resources import asset_path
+from getup_jax.release.export import CARD, export
+from getup_jax.runtime.checkpoint import load_policy
 
 WALK = asset_path("checkpoints", "walk")
 

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from getup_jax.config import PhysicsConfig
-from getup_jax.naturalness import FootPoints, jerk, power, saturation, self_penetration
+from getup_jax.evaluation.motion_quality import (
+    FootPoints,
+    jerk,
+    power,
+    saturation,
+    self_penetration,
+)
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.native import NativeEngine
 from getup_jax.physics.terrain import Terrain

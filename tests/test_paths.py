@@ -5,41 +5,45 @@ from pathlib import Path
 
 import pytest
 
-from getup_jax import paths
+from getup_jax.core import resources
 
 
 def test_configs_and_assets_are_found_in_a_checkout():
-    assert paths.config_path("flat").is_file()
-    assert paths.asset_path().is_dir()
-    assert paths.asset_path("checkpoints", "flat").parts[-3:] == ("assets", "checkpoints", "flat")
+    assert resources.config_path("flat").is_file()
+    assert resources.asset_path().is_dir()
+    assert resources.asset_path("checkpoints", "flat").parts[-3:] == (
+        "assets",
+        "checkpoints",
+        "flat",
+    )
 
 
 @pytest.mark.parametrize("name", ["flat", "flat.yaml", "configs/flat.yaml", "configs/flat"])
 def test_the_forms_of_a_config_name(name):
-    assert paths.config_path(name) == paths.config_path("flat")
+    assert resources.config_path(name) == resources.config_path("flat")
 
 
 def test_a_path_elsewhere_is_not_taken_for_a_shipped_config():
-    assert not paths.config_path("mine/flat.yaml").exists()
+    assert not resources.config_path("mine/flat.yaml").exists()
 
 
 def test_shipped_configs_exist():
-    names = paths.shipped_configs()
+    names = resources.shipped_configs()
     assert {"flat", "paper_flat", "quick"} <= set(names)
-    assert all(paths.config_path(name).is_file() for name in names)
+    assert all(resources.config_path(name).is_file() for name in names)
 
 
 def test_a_wheel_has_them_inside_the_package(tmp_path):
     package, checkout = tmp_path / "site" / "getup_jax", tmp_path
     (package / "assets").mkdir(parents=True)
-    assert paths._root("assets", package, checkout) == package / "assets"
-    assert paths._root("configs", package, checkout) == checkout / "configs"
+    assert resources._root("assets", package, checkout) == package / "assets"
+    assert resources._root("configs", package, checkout) == checkout / "configs"
 
 
 def test_the_cache_folder_can_be_chosen(tmp_path, monkeypatch):
     monkeypatch.setenv("GETUP_JAX_CACHE", str(tmp_path / "a" / "b"))
-    assert paths.cache_dir() == tmp_path / "a" / "b"
-    assert paths.cache_dir().is_dir()
+    assert resources.cache_dir() == tmp_path / "a" / "b"
+    assert resources.cache_dir().is_dir()
 
 
 @pytest.mark.parametrize(
@@ -58,11 +62,11 @@ def test_the_cache_folder_of_each_platform(tmp_path, monkeypatch, platform, vari
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     if variable is not None:
         monkeypatch.setenv(variable, str(tmp_path / "chosen"))
-    assert paths.cache_dir() == tmp_path / expected
+    assert resources.cache_dir() == tmp_path / expected
 
 
 def test_a_cache_folder_that_cannot_be_made_says_what_to_do(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("GETUP_JAX_CACHE", str(tmp_path / "file" / "cache"))
     with pytest.raises(OSError, match=r"cannot create.*set GETUP_JAX_CACHE"):
-        paths.cache_dir()
+        resources.cache_dir()

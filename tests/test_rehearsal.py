@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from tiny_composite import COMPOSITE, CONFIG, clips, tiny_composite
 
-from getup_jax import rehearsal
-from getup_jax.algo.learner import make_learner
-from getup_jax.algo.meta_chain import with_meta
-from getup_jax.checkpoint import save_learner
-from getup_jax.motion.loops import repeated
+from getup_jax.envs.composite.meta.chain import with_meta
+from getup_jax.envs.composite.reference_state_init import FOLLOWING, Following, clip_starts
+from getup_jax.imitation import dagger
+from getup_jax.motion.authoring.loops import repeated
 from getup_jax.physics.character import load_character
-from getup_jax.tasks.clip_starts import FOLLOWING, Following, clip_starts
+from getup_jax.rl.learner import make_learner
+from getup_jax.runtime.checkpoint import save_learner
 
 KEY = jax.random.PRNGKey(0)
 
@@ -53,17 +53,17 @@ def test_targets_lead_by_the_lag_of_the_servo(built):
     made = dataclasses.replace(built, following=Following(ramp[None, None], np.zeros(1)))
     lag = -model.actuator_biasprm[:, 2] / model.actuator_gainprm[:, 0]
     expected = ramp[:-1] + lag * 0.01 * 30.0  # rad + s * rad/s
-    np.testing.assert_allclose(rehearsal.clip_targets(made)[0, 0], expected, atol=1e-9)
+    np.testing.assert_allclose(dagger.clip_targets(made)[0, 0], expected, atol=1e-9)
 
 
 def test_the_actor_comes_to_name_the_clips_targets(built, monkeypatch):
-    monkeypatch.setattr(rehearsal, "_MINIBATCH", 16)
-    monkeypatch.setattr(rehearsal, "_ROUNDS", 2)
+    monkeypatch.setattr(dagger, "_MINIBATCH", 16)
+    monkeypatch.setattr(dagger, "_ROUNDS", 2)
     learner = make_learner(built.environment, CONFIG.network, CONFIG.ppo, total_steps=1000)
     policy = learner.init_learner(KEY).policy
     row = jnp.arange(8)
     observation = built.environment.start(built.world, row, KEY).observation
-    targets = rehearsal.clip_targets(built)[row, 0, 0]
+    targets = dagger.clip_targets(built)[row, 0, 0]
 
     def miss(policy) -> float:
         action = learner.act(policy, observation)
@@ -71,8 +71,8 @@ def test_the_actor_comes_to_name_the_clips_targets(built, monkeypatch):
         return float(np.sqrt(np.mean(np.square(target - targets))))
 
     log: list[str] = []
-    stage = rehearsal.Stage(built, built.world)
-    after = rehearsal.rehearse(learner, stage, policy, KEY, log.append)
+    stage = dagger.Stage(built, built.world)
+    after = dagger.rehearse(learner, stage, policy, KEY, log.append)
     assert miss(after) < 0.5 * miss(policy)
     std = learner.model.distribution(after.actor, jnp.zeros_like(observation), jnp.ones(()))[1]
     np.testing.assert_allclose(std, CONFIG.network.initial_std, rtol=0.5)
@@ -102,18 +102,18 @@ def test_what_follows_on_an_arc_is_the_same_moment_of_its_clip(built):
 def test_targets_of_an_arc_lie_to_its_side():
     turns, count = np.array([0.0, 1.0, -1.0]), 2000
     arc = np.repeat(np.arange(3), count)
-    found = np.asarray(rehearsal._bearings(turns, arc, KEY)).reshape(3, count)
+    found = np.asarray(dagger._bearings(turns, arc, KEY)).reshape(3, count)
     np.testing.assert_allclose(found.min(axis=1), [-0.5, 0.5, -np.pi], atol=0.01)
     np.testing.assert_allclose(found.max(axis=1), [0.5, np.pi, -0.5], atol=0.01)
-    (alone,) = np.asarray(rehearsal._bearings(np.zeros(1), arc[:count], KEY)).reshape(1, count)
+    (alone,) = np.asarray(dagger._bearings(np.zeros(1), arc[:count], KEY)).reshape(1, count)
     assert alone.min() < -3.0
     assert alone.max() > 3.0
 
 
 def test_over_a_meta_policy_only_the_new_clips_are_learned(built, monkeypatch, tmp_path):
-    monkeypatch.setattr(rehearsal, "_MINIBATCH", 16)
-    monkeypatch.setattr(rehearsal, "_ROUNDS", 2)
-    monkeypatch.setattr(rehearsal, "_EPOCHS", 150)
+    monkeypatch.setattr(dagger, "_MINIBATCH", 16)
+    monkeypatch.setattr(dagger, "_ROUNDS", 2)
+    monkeypatch.setattr(dagger, "_EPOCHS", 150)
     monkeypatch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
     trained = make_learner(built.environment, CONFIG.network, CONFIG.ppo, total_steps=1000)
     item = {"policy": trained.init_learner(jax.random.PRNGKey(5)).policy, "prior": None}
@@ -126,14 +126,14 @@ def test_over_a_meta_policy_only_the_new_clips_are_learned(built, monkeypatch, t
     row = jnp.arange(8)
     start = built.environment.start(built.world, row, KEY)
     observation = env.adopt(world, start, start.goals, KEY).observation
-    clip = rehearsal.clip_targets(built)[row, 0, 0] - built.world.target_centre
+    clip = dagger.clip_targets(built)[row, 0, 0] - built.world.target_centre
     wanted = np.where(new, clip / built.world.target_scale, observation[:, -env.action_size :])
 
     def miss(policy) -> np.ndarray:
         gap = built.world.target_scale * (learner.act(policy, observation) - wanted)
         return np.sqrt(np.mean(np.square(gap), axis=0))
 
-    stage = rehearsal.Stage(built, world, new)
-    after = rehearsal.rehearse(learner, stage, policy, KEY, lambda text: None)
+    stage = dagger.Stage(built, world, new)
+    after = dagger.rehearse(learner, stage, policy, KEY, lambda text: None)
     assert miss(after)[new].mean() < 0.5 * miss(policy)[new].mean()
     assert miss(after)[~new].mean() < miss(policy)[~new].mean()

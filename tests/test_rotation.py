@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from getup_jax import rotation
+from getup_jax.core import quaternion
 
 RANDOM = Rotation.random(50, rng=np.random.default_rng(0))
 OTHER = Rotation.random(50, rng=np.random.default_rng(1))
@@ -38,47 +38,47 @@ def assert_same_rotation(q, expected: Rotation, atol: float = 1e-5) -> None:
 
 def heading_of(r: Rotation) -> np.ndarray:
     """Heading angle (rad)."""
-    return scipy(rotation.heading(quat(r))).as_rotvec()[..., 2]
+    return scipy(quaternion.heading(quat(r))).as_rotvec()[..., 2]
 
 
 def test_multiply_is_scipys_composition():
-    assert_same_rotation(rotation.multiply(quat(RANDOM), quat(OTHER)), RANDOM * OTHER)
+    assert_same_rotation(quaternion.multiply(quat(RANDOM), quat(OTHER)), RANDOM * OTHER)
 
 
 def test_rotate_is_scipys_apply():
-    turned = rotation.rotate(quat(RANDOM), jnp.asarray(VECTORS, jnp.float32))
+    turned = quaternion.rotate(quat(RANDOM), jnp.asarray(VECTORS, jnp.float32))
     np.testing.assert_allclose(turned, RANDOM.apply(VECTORS), atol=1e-5)
 
 
 def test_rotate_broadcasts_one_quaternion_over_vectors():
-    turned = rotation.rotate(quat(RANDOM[0])[None], jnp.asarray(VECTORS, jnp.float32))
+    turned = quaternion.rotate(quat(RANDOM[0])[None], jnp.asarray(VECTORS, jnp.float32))
     np.testing.assert_allclose(turned, RANDOM[0].apply(VECTORS), atol=1e-5)
 
 
 def test_conjugate_is_the_inverse():
-    assert_same_rotation(rotation.conjugate(quat(RANDOM)), RANDOM.inv())
-    one = rotation.multiply(quat(RANDOM), rotation.conjugate(quat(RANDOM)))
+    assert_same_rotation(quaternion.conjugate(quat(RANDOM)), RANDOM.inv())
+    one = quaternion.multiply(quat(RANDOM), quaternion.conjugate(quat(RANDOM)))
     np.testing.assert_allclose(one, np.tile([1, 0, 0, 0], (50, 1)), atol=1e-6)
 
 
 def test_angle_is_scipys_magnitude():
-    np.testing.assert_allclose(rotation.angle(quat(RANDOM)), RANDOM.magnitude(), atol=1e-5)
+    np.testing.assert_allclose(quaternion.angle(quat(RANDOM)), RANDOM.magnitude(), atol=1e-5)
 
 
 def test_angle_is_the_same_for_q_and_minus_q():
-    np.testing.assert_array_equal(rotation.angle(-quat(RANDOM)), rotation.angle(quat(RANDOM)))
+    np.testing.assert_array_equal(quaternion.angle(-quat(RANDOM)), quaternion.angle(quat(RANDOM)))
 
 
 @pytest.mark.parametrize("radians", [0.0, 1e-4, 1.0, np.pi - 1e-3, np.pi])
 def test_angle_keeps_its_precision_at_both_ends(radians):
-    got = rotation.angle(quat(Rotation.from_rotvec([0.0, radians, 0.0])))
+    got = quaternion.angle(quat(Rotation.from_rotvec([0.0, radians, 0.0])))
     assert float(got) == pytest.approx(radians, abs=1e-6)
 
 
 def test_canonical_is_the_same_rotation_with_a_scalar_part_of_at_least_0():
     q = quat(RANDOM)
     both = jnp.concatenate([q, -q])
-    got = rotation.canonical(both)
+    got = quaternion.canonical(both)
     assert (np.asarray(both[:, 0]) < 0).any()
     assert (np.asarray(got[:, 0]) >= 0).all()
     np.testing.assert_array_equal(got[:50], got[50:])
@@ -86,7 +86,7 @@ def test_canonical_is_the_same_rotation_with_a_scalar_part_of_at_least_0():
 
 
 def test_about_z():
-    assert_same_rotation(rotation.about_z(jnp.asarray(YAWS)), yaw(YAWS))
+    assert_same_rotation(quaternion.about_z(jnp.asarray(YAWS)), yaw(YAWS))
 
 
 def test_heading_of_a_turn_about_the_vertical_is_the_turn():
@@ -114,10 +114,10 @@ def test_heading_is_continuous_in_a_whole_roll_on_the_floor():
 
 def test_heading_of_upside_down_is_the_identity():
     upside_down = quat(Rotation.from_rotvec([np.pi, 0.0, 0.0])).at[0].set(0.0)
-    np.testing.assert_array_equal(rotation.heading(upside_down), [1, 0, 0, 0])
+    np.testing.assert_array_equal(quaternion.heading(upside_down), [1, 0, 0, 0])
 
 
 def test_heading_is_a_unit_quaternion_about_the_vertical():
-    q = np.asarray(rotation.heading(quat(RANDOM)))
+    q = np.asarray(quaternion.heading(quat(RANDOM)))
     np.testing.assert_allclose(np.linalg.norm(q, axis=-1), 1.0, atol=1e-6)
     np.testing.assert_array_equal(q[:, 1:3], 0.0)

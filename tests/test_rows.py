@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from getup_jax.rows import replace_rows
+from getup_jax.core.masked_update import replace_rows
 
 N = 10
 

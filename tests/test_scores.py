@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from getup_jax.grounds import Places
+from getup_jax.envs.getup.episode import STANDING
+from getup_jax.evaluation.ground_kinds import Places
+from getup_jax.evaluation.metrics import episode_values, score, stand_time, to_json, wilson
+from getup_jax.evaluation.table import table
 from getup_jax.motion.clips import GetUp
-from getup_jax.score_table import table
-from getup_jax.scores import episode_values, score, stand_time, to_json, wilson
-from getup_jax.tasks.episode import STANDING
 
 DT = 0.5
 STAND_S = 1.0

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from getup_jax.config import Config, ConfigError
-from getup_jax.convert import section
-from getup_jax.settings import dump_yaml, load_config, to_dict
+from getup_jax.config.convert import section
+from getup_jax.config.load import dump_yaml, load_config, to_dict
 
 
 @pytest.fixture

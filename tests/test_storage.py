@@ -9,7 +9,7 @@ import pytest
 from flax import serialization
 
 from checkpoint_samples import assert_same, make_policy, make_state
-from getup_jax.storage import (
+from getup_jax.runtime.pytree_store import (
     CheckpointError,
     from_nested,
     is_finite,

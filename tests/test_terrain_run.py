@@ -11,15 +11,15 @@ import pytest
 from ground_samples import TERRAIN
 from tiny_task import CONFIG, getups, neutral_prior
 
-from getup_jax import checkpoint
-from getup_jax.algo.learner import make_learner
 from getup_jax.config import NetworkConfig, PPOConfig
-from getup_jax.nets.prior import to_dict
+from getup_jax.envs.getup.build import assemble
+from getup_jax.envs.getup.episode import with_shared
+from getup_jax.envs.getup.resets import region_pool
 from getup_jax.physics.character import load_character
-from getup_jax.storage import CheckpointError, to_nested
-from getup_jax.tasks import region_pool
-from getup_jax.tasks.build import assemble
-from getup_jax.tasks.episode import with_shared
+from getup_jax.pose_prior.prior import to_dict
+from getup_jax.rl.learner import make_learner
+from getup_jax.runtime import checkpoint
+from getup_jax.runtime.pytree_store import CheckpointError, to_nested
 
 PPO = PPOConfig(num_envs=8, num_steps=3, epochs=1, minibatch_size=24)
 TASK = dataclasses.replace(CONFIG.task, pool_size=96, focus=0.5)

@@ -14,14 +14,15 @@ import numpy as np
 import pytest
 from flax import struct
 
-from getup_jax import checkpoint, loop, runfolder
 from getup_jax.config import Config, ConfigError
-from getup_jax.loop import Job, TrainingError
-from getup_jax.metrics import read_metrics
-from getup_jax.progress import Display
-from getup_jax.settings import load_config
-from getup_jax.storage import CheckpointError
-from getup_jax.train import run
+from getup_jax.config.load import load_config
+from getup_jax.runtime import checkpoint, run_folder
+from getup_jax.runtime.console import Display
+from getup_jax.runtime.metric_file import read_metrics
+from getup_jax.runtime.pytree_store import CheckpointError
+from getup_jax.training import loop
+from getup_jax.training.loop import Job, TrainingError
+from getup_jax.training.run import run
 
 PER_ITERATION = 8  # samples of an iteration of `settings()`
 
@@ -264,7 +265,7 @@ def test_a_checkpoint_remembers_the_body_and_runs_say_where_it_is_another(tmp_pa
 def test_a_folder_that_holds_something_is_not_overwritten(tmp_path):
     train(tmp_path, 1)
     before = arrays(tmp_path)
-    with pytest.raises(runfolder.RunError, match="holds a run already; add --resume"):
+    with pytest.raises(run_folder.RunError, match="holds a run already; add --resume"):
         train(tmp_path, 2)
     jax.tree.map(np.testing.assert_array_equal, arrays(tmp_path), before)
 

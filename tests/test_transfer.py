@@ -11,18 +11,18 @@ import pytest
 from tiny_task import untrained_prior
 
 from eval_samples import SMALL, make_policy, make_task, save_policy
-from getup_jax import lessons, transfer
-from getup_jax.algo.actor_critic import observe
-from getup_jax.algo.learner import Learner
-from getup_jax.algo.state import PolicyState
-from getup_jax.checkpoint import CHECKPOINTS, LoadedPolicy, load_policy, save_learner
 from getup_jax.config import Config
-from getup_jax.storage import CheckpointError
-from getup_jax.tasks.actions import Units
-from getup_jax.tasks.build import BuiltTask
-from getup_jax.tasks.observation import Observer
-from getup_jax.tasks.symmetry import find_symmetry
-from getup_jax.transfer import Teacher, carry_over, make_teacher
+from getup_jax.envs.getup.action_decoder import Units
+from getup_jax.envs.getup.build import BuiltTask
+from getup_jax.envs.getup.observation import Observer
+from getup_jax.envs.getup.symmetry import find_symmetry
+from getup_jax.imitation import action_distillation, action_regression
+from getup_jax.imitation.action_distillation import Teacher, carry_over, make_teacher
+from getup_jax.rl.actor_critic import observe
+from getup_jax.rl.learner import Learner
+from getup_jax.rl.state import PolicyState
+from getup_jax.runtime.checkpoint import CHECKPOINTS, LoadedPolicy, load_policy, save_learner
+from getup_jax.runtime.pytree_store import CheckpointError
 
 KEY = jax.random.PRNGKey(0)
 CONFIG = dataclasses.replace(
@@ -78,9 +78,9 @@ def teacher_of(learner: Learner, policy: PolicyState, units: Units) -> Teacher:
 
 def quickly(monkeypatch, rounds: int = 1) -> None:
     """Few and small lessons."""
-    monkeypatch.setattr(transfer, "_ROUNDS", rounds)
-    monkeypatch.setattr(lessons, "_EPOCHS", 60)
-    monkeypatch.setattr(lessons, "_MINIBATCH", 64)
+    monkeypatch.setattr(action_distillation, "_ROUNDS", rounds)
+    monkeypatch.setattr(action_regression, "_EPOCHS", 60)
+    monkeypatch.setattr(action_regression, "_MINIBATCH", 64)
 
 
 def differences(log: list[str]) -> tuple[float, float, float]:
@@ -120,7 +120,7 @@ def test_offsets_are_avoided_where_latents_can_say_the_same(task, old, monkeypat
     learner, policy = make_policy(task, CONFIG)
     lengths = []
     for weight in (0.0, 1.0):
-        monkeypatch.setattr(lessons, "_NATURAL", weight)
+        monkeypatch.setattr(action_regression, "_NATURAL", weight)
         log: list[str] = []
         teacher = teacher_of(learner, policy, old)
         carry_over(learner, task.world, policy, teacher, KEY, log.append)
@@ -133,8 +133,10 @@ def test_the_difference_is_the_root_mean_square_in_degrees(task, old):
     action, condition = samples(np.random.default_rng(2), 4)
     observation = jnp.ones((4, learner.env.observation_size))
     target = old.target(learner.act(policy, observation), condition) + math.radians(3.0)
-    lesson = lessons.Lesson(observation, action, target, condition)
-    assert lessons.compare(learner, policy, old, lesson)[0] == pytest.approx(3.0, rel=1e-3)
+    lesson = action_regression.Lesson(observation, action, target, condition)
+    assert action_regression.compare(learner, policy, old, lesson)[0] == pytest.approx(
+        3.0, rel=1e-3
+    )
 
 
 # --- mirror images

@@ -9,10 +9,10 @@ import pytest
 from fake_writer import FakeWriter
 
 from eval_samples import make_task, run
-from getup_jax import video
-from getup_jax.conditions import Conditions
 from getup_jax.config import ConfigError
-from getup_jax.episodes import Episodes
+from getup_jax.evaluation import film
+from getup_jax.evaluation.rollout import Episodes
+from getup_jax.evaluation.scenario import Conditions
 from getup_jax.motion.clips import GetUp
 
 
@@ -35,24 +35,24 @@ def with_success(episodes: Episodes, success: list[bool], reward: list[float]) -
 def test_typical_is_a_success_where_there_is_one(episodes):
     # episodes 0 and 2 are of the first style, 1 and 3 of the second
     changed = with_success(episodes, [False, True, True, False], [0.9, 0.5, 0.1, 0.8])
-    assert video.typical(changed, 2) == [2, 1]
+    assert film.typical(changed, 2) == [2, 1]
 
 
 def test_typical_is_the_median_and_not_the_best(episodes):
     changed = with_success(episodes, [False] * 4, [0.9, 0.1, 0.2, 0.5])
-    assert video.typical(changed, 2) == [0, 3]  # of two the upper one
-    assert video.typical(changed, 1) == [0]
+    assert film.typical(changed, 2) == [0, 3]  # of two the upper one
+    assert film.typical(changed, 1) == [0]
 
 
 def test_the_label_names_the_style_its_time_and_the_end(episodes):
     changed = with_success(episodes, [True, False, False, False], [1.0] * 4)
-    assert video.label(changed, 0) == "clip, 1.0 s: stands"
-    assert video.label(changed, 1) == "curve, 2.0 s: does not stand"
+    assert film.label(changed, 0) == "clip, 1.0 s: stands"
+    assert film.label(changed, 1) == "curve, 2.0 s: does not stand"
 
 
 def test_the_caption_writes_on_the_picture():
     image = np.full((100, 200, 3), 200, np.uint8)
-    written = video.caption(image, "clip")
+    written = film.caption(image, "clip")
     assert written.shape == image.shape
     assert (written[30:] == 200).all()
     assert {0, 255} <= set(np.unique(written[:26]))
@@ -66,13 +66,13 @@ def test_the_camera_turns_with_the_body(heading):
     mujoco.mju_mulQuat(lying[3:7], turn, np.array([half, 0.0, half, 0.0]))  # the spine along +x
     standing[3:7] = turn
     for pose in (lying, standing):
-        got = np.radians(video.view(pose)) - np.radians(120.0) - heading
+        got = np.radians(film.view(pose)) - np.radians(120.0) - heading
         assert np.cos(got) == pytest.approx(1.0)
 
 
 def can_render(episodes: Episodes) -> bool:
     try:
-        video.render(episodes.task.environment.character.model, episodes.trace.qpos[:1, 0], (8, 8))
+        film.render(episodes.task.environment.character.model, episodes.trace.qpos[:1, 0], (8, 8))
     except ConfigError:
         return False
     return True
@@ -80,13 +80,13 @@ def can_render(episodes: Episodes) -> bool:
 
 def test_a_film_has_the_frames_at_the_rate_of_the_policy(episodes, monkeypatch, tmp_path):
     writer = FakeWriter()
-    monkeypatch.setattr(video, "require", lambda: writer)
+    monkeypatch.setattr(film, "require", lambda: writer)
     monkeypatch.setattr(
-        video, "render", lambda model, qpos: [np.zeros((48, 64, 3), np.uint8)] * len(qpos)
+        film, "render", lambda model, qpos: [np.zeros((48, 64, 3), np.uint8)] * len(qpos)
     )
-    video.film(tmp_path / "a.mp4", episodes)
+    film.film(tmp_path / "a.mp4", episodes)
     assert writer.settings["fps"] == 30
-    chosen = video.typical(episodes, video.STYLES)
+    chosen = film.typical(episodes, film.STYLES)
     steps = int(episodes.trace.running[:, chosen].sum())
     assert len(writer.images) == steps + 15 * len(
         chosen
@@ -97,12 +97,12 @@ def test_pictures_show_the_body(episodes):
     if not can_render(episodes):
         pytest.skip("this machine cannot render")
     model = episodes.task.environment.character.model
-    image, other = video.render(model, episodes.trace.qpos[:2, 0], (60, 80))
+    image, other = film.render(model, episodes.trace.qpos[:2, 0], (60, 80))
     assert image.shape == (60, 80, 3)
     assert image.std() > 5
     away = episodes.trace.qpos[:1, 0].copy()
     away[:, 2] += 50.0
-    (empty,) = video.render(model, away, (60, 80))
+    (empty,) = film.render(model, away, (60, 80))
     assert np.abs(image.astype(int) - empty).max() > 30
     assert np.abs(image.astype(int) - other).mean() < 5
 
@@ -113,7 +113,7 @@ def test_a_real_film(episodes, tmp_path):
     if not can_render(episodes):
         pytest.skip("this machine cannot render")
     file = tmp_path / "a.mp4"
-    video.film(file, episodes)
+    film.film(file, episodes)
     with imageio.get_reader(file) as reader:
         assert reader.get_meta_data()["fps"] == 30
         assert reader.get_meta_data()["size"] == (640, 480)
@@ -122,7 +122,7 @@ def test_a_real_film(episodes, tmp_path):
 def test_without_imageio_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio.v2", None)
     with pytest.raises(ConfigError, match=r"pip install 'getup-jax\[video\]'"):
-        video.require()
+        film.require()
 
 
 def test_without_a_renderer_the_error_says_what_to_set(episodes, monkeypatch):
@@ -131,11 +131,11 @@ def test_without_a_renderer_the_error_says_what_to_set(episodes, monkeypatch):
 
     tries = []
     monkeypatch.setattr(mujoco, "Renderer", lambda *_: tries.append(1) or fail())
-    monkeypatch.setattr(video, "_failures", [])
+    monkeypatch.setattr(film, "_failures", [])
     with pytest.raises(ConfigError, match=r"no display.*MUJOCO_GL=egl"):
-        video.render(episodes.task.environment.character.model, episodes.trace.qpos[:1, 0])
+        film.render(episodes.task.environment.character.model, episodes.trace.qpos[:1, 0])
     with pytest.raises(ConfigError, match="no display"):
-        video.render(episodes.task.environment.character.model, episodes.trace.qpos[:1, 0])
+        film.render(episodes.task.environment.character.model, episodes.trace.qpos[:1, 0])
     assert len(tries) == 1  # a second try would abort Python where GLFW has failed
 
 
@@ -143,4 +143,4 @@ def test_styles_are_spread_over_all_of_them(episodes):
     styles = tuple(GetUp(str(i), 1.0, np.zeros((9, 3))) for i in range(4))
     task = dataclasses.replace(episodes.task, getups=styles)
     plan = dataclasses.replace(episodes.plan, getup=np.arange(4))
-    assert video.typical(Episodes(task, plan, episodes.trace), 2) == [0, 3]
+    assert film.typical(Episodes(task, plan, episodes.trace), 2) == [0, 3]

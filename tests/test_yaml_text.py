@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from getup_jax.yaml_text import YamlError, parse
+from getup_jax.config.yaml_text import YamlError, parse
 
 
 @pytest.mark.parametrize(

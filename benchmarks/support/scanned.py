@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from getup_jax.types import Engine, PhysicsState, PropCommand, StepOutput, select
+from getup_jax.core.types import Engine, PhysicsState, PropCommand, StepOutput, select
 
 
 @struct.dataclass

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from getup_jax.config import Config, MotionConfig, PriorConfig
+from getup_jax.config.load import load_config
 from getup_jax.motion.library import AUTHORED, DEEPMIMIC
-from getup_jax.settings import load_config
 
 NUM_STEPS = 8  # short, so that many rounds fit; rates do not depend on it
 LEAST_STARTS = 64

@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from getup_jax.types import StepOutput
+from getup_jax.core.types import StepOutput
 
 
 @struct.dataclass

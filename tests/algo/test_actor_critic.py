@@ -7,12 +7,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from getup_jax.algo import normalize
-from getup_jax.algo.actor_critic import ActorCritic, make_actor_critic, normalized, observe
-from getup_jax.algo.state import LearnerState
 from getup_jax.config import NetworkConfig, PPOConfig
-from getup_jax.mirror import CURVE, POLAR, QUATERNION, Symmetry, concatenated, signed, vectors
-from getup_jax.nets.mlp import MLP
+from getup_jax.core.mirror import CURVE, POLAR, QUATERNION, Symmetry, concatenated, signed, vectors
+from getup_jax.networks.mlp import MLP
+from getup_jax.rl import normalize
+from getup_jax.rl.actor_critic import ActorCritic, make_actor_critic, normalized, observe
+from getup_jax.rl.state import LearnerState
 
 SYMMETRY = Symmetry(
     observation=concatenated([vectors([1, 0], signed(POLAR)), CURVE, signed(QUATERNION)]),

@@ -3,20 +3,20 @@ from __future__ import annotations
 import jax.numpy as jnp
 from numpy.testing import assert_allclose
 
-from getup_jax.algo import average
+from getup_jax.rl import weight_average
 
 
 def _after(updates: int, samples: int) -> float:
     """The average of actors 0, 1, 2, ... after so many."""
     value = {"w": jnp.zeros(())}
     for n in range(updates):
-        value = average.update(value, {"w": jnp.asarray(float(n))}, jnp.asarray(n), samples)
+        value = weight_average.update(value, {"w": jnp.asarray(float(n))}, jnp.asarray(n), samples)
     return float(value["w"])
 
 
 def test_the_first_update_replaces_what_was_there():
     before, actor = {"w": jnp.asarray(7.0)}, {"w": jnp.asarray(1.0)}
-    assert float(average.update(before, actor, jnp.asarray(0), 100)["w"]) == 1.0
+    assert float(weight_average.update(before, actor, jnp.asarray(0), 100)["w"]) == 1.0
 
 
 def test_a_young_run_averages_over_its_last_tenth():
@@ -28,4 +28,4 @@ def test_a_young_run_averages_over_its_last_tenth():
 def test_a_long_run_averages_over_the_window():
     # an exponential average with fraction f is 1 / f - 1 updates old
     age = 4000 - 1 - _after(4000, samples=20_000)
-    assert_allclose(age, average.WINDOW_STEPS / 20_000 - 1, rtol=0.02)
+    assert_allclose(age, weight_average.WINDOW_STEPS / 20_000 - 1, rtol=0.02)

@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from getup_jax.algo import normalize
-from getup_jax.algo.discriminator import (
-    Discriminator,
-    Pairs,
-    gradient_penalty,
-    hinge_loss,
-    reward,
-)
 from getup_jax.config import DiscriminatorConfig
+from getup_jax.rl import normalize
+from getup_jax.rl.discriminator import Discriminator, Pairs, gradient_penalty, hinge_loss, reward
 
 CONFIG = DiscriminatorConfig(
     gru_size=16, hidden_sizes=(16,), heads=4, learning_rate=3e-3, minibatch_size=64

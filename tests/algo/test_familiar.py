@@ -11,13 +11,13 @@ import pytest
 from numpy.testing import assert_allclose
 from tiny_composite import COMPOSITE, CONFIG, tiny_composite
 
-from getup_jax import rotation
-from getup_jax.algo.familiar import familiar, make_familiar
-from getup_jax.algo.learner import make_learner
-from getup_jax.algo.meta_chain import with_meta
-from getup_jax.checkpoint import save_learner
 from getup_jax.config import CompositeConfig, ConfigError
+from getup_jax.core import quaternion
+from getup_jax.envs.composite.meta.chain import with_meta
+from getup_jax.envs.composite.meta.observation_substitution import familiar, make_familiar
 from getup_jax.physics.character import load_character
+from getup_jax.rl.learner import make_learner
+from getup_jax.runtime.checkpoint import save_learner
 
 KEY = jax.random.PRNGKey(0)
 
@@ -35,12 +35,12 @@ def arm(built):
 
 def moved(history: np.ndarray, yaw: float, offset: np.ndarray) -> np.ndarray:
     """The same motion elsewhere: turned about the vertical and shifted."""
-    turn = rotation.about_z(jnp.asarray(yaw))
+    turn = quaternion.about_z(jnp.asarray(yaw))
     blocks = [
-        rotation.rotate(turn, jnp.asarray(history[..., :3])) + offset,
-        rotation.multiply(jnp.broadcast_to(turn, history[..., 3:7].shape), history[..., 3:7]),
-        rotation.rotate(turn, jnp.asarray(history[..., 7:10])),
-        rotation.rotate(turn, jnp.asarray(history[..., 10:])),
+        quaternion.rotate(turn, jnp.asarray(history[..., :3])) + offset,
+        quaternion.multiply(jnp.broadcast_to(turn, history[..., 3:7].shape), history[..., 3:7]),
+        quaternion.rotate(turn, jnp.asarray(history[..., 7:10])),
+        quaternion.rotate(turn, jnp.asarray(history[..., 10:])),
     ]
     return np.concatenate(blocks, axis=-1)
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from getup_jax.algo.gae import gae
+from getup_jax.rl.gae import gae
 
 T, B, K = 12, 5, 3
 NEVER = np.zeros((T, B), bool)

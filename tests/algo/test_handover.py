@@ -11,13 +11,13 @@ import pytest
 from numpy.testing import assert_allclose
 from tiny_composite import COMPOSITE, CONFIG, tiny_composite
 
-from getup_jax.algo import handover
-from getup_jax.algo.learner import make_learner
-from getup_jax.algo.meta_chain import with_meta
-from getup_jax.checkpoint import save_learner
-from getup_jax.composite.episodes import without_noise
 from getup_jax.config import CompositeConfig, ConfigError
+from getup_jax.envs.composite.meta import residual_blending
+from getup_jax.envs.composite.meta.chain import with_meta
+from getup_jax.evaluation.composite_rollout import without_noise
 from getup_jax.physics.character import load_character
+from getup_jax.rl.learner import make_learner
+from getup_jax.runtime.checkpoint import save_learner
 
 KEY = jax.random.PRNGKey(0)
 
@@ -25,8 +25,8 @@ KEY = jax.random.PRNGKey(0)
 def test_only_new_hinges_are_blended():
     own, meta = jnp.asarray([[1.0, 2.0]]), jnp.asarray([[5.0, 6.0]])
     new = jnp.asarray([True, False])
-    assert_allclose(handover.blended(jnp.asarray(0.25), new, own, meta), [[2.0, 2.0]])
-    assert_allclose(handover.blended(jnp.asarray(0.0), new, own, meta), own)
+    assert_allclose(residual_blending.blended(jnp.asarray(0.25), new, own, meta), [[2.0, 2.0]])
+    assert_allclose(residual_blending.blended(jnp.asarray(0.0), new, own, meta), own)
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,9 @@ def test_only_new_hinges_are_blended():
 )
 def test_the_share_follows_the_falls(share, falls, expected):
     fell = jnp.arange(400) < falls
-    assert_allclose(handover.followed(jnp.asarray(share), fell, 0.1, 0.6), expected, atol=1e-6)
+    assert_allclose(
+        residual_blending.followed(jnp.asarray(share), fell, 0.1, 0.6), expected, atol=1e-6
+    )
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from probes import Probe
 
-from getup_jax.algo.improve import Improver, cosine
-from getup_jax.algo.learner import make_learner
-from getup_jax.algo.ppo import Samples
 from getup_jax.config import NetworkConfig, PPOConfig
-from getup_jax.nets import gaussian
+from getup_jax.networks import gaussian
+from getup_jax.rl.learner import make_learner
+from getup_jax.rl.policy_update import Improver, cosine
+from getup_jax.rl.ppo import Samples
 
 STEPS, ENVS = 8, 16
 CONFIG = PPOConfig(num_envs=ENVS, num_steps=STEPS, epochs=1, critic_epochs=3, minibatch_size=32)

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from flax import struct
 
-from getup_jax.algo.learner import make_learner
 from getup_jax.config import NetworkConfig, PPOConfig
-from getup_jax.types import StepOutput
+from getup_jax.core.types import StepOutput
+from getup_jax.rl.learner import make_learner
 
 BONUS = 4.0
 DISCOUNT = 0.95

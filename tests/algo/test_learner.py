@@ -9,13 +9,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from probes import Probe, make_world
 
-from getup_jax.algo.actor_critic import normalized
-from getup_jax.algo.estimate import next_values
-from getup_jax.algo.improve import COSINE_EVERY
-from getup_jax.algo.learner import Learner, make_learner
-from getup_jax.algo.state import TrainState
-from getup_jax.algo.update import adapt_scale, first_scale
 from getup_jax.config import NetworkConfig, PPOConfig
+from getup_jax.rl.actor_critic import normalized
+from getup_jax.rl.advantages import next_values
+from getup_jax.rl.learner import Learner, make_learner
+from getup_jax.rl.minibatch import adapt_scale, first_scale
+from getup_jax.rl.policy_update import COSINE_EVERY
+from getup_jax.rl.state import TrainState
 
 NETWORK = NetworkConfig(hidden_sizes=(16,), activation="tanh")
 CONFIG = PPOConfig(

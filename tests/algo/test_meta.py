@@ -10,13 +10,13 @@ from numpy.testing import assert_allclose
 from probes import Probe
 from tiny_composite import CONFIG, tiny_composite
 
-from getup_jax import train
-from getup_jax.algo.actor_critic import META_LOGIT, make_actor_critic, normalized, observe
-from getup_jax.algo.learner import make_learner
-from getup_jax.algo.meta_chain import with_meta
-from getup_jax.checkpoint import save_learner
 from getup_jax.config import Config, ConfigError, NetworkConfig
+from getup_jax.envs.composite.meta.chain import with_meta
 from getup_jax.physics.character import load_character
+from getup_jax.rl.actor_critic import META_LOGIT, make_actor_critic, normalized, observe
+from getup_jax.rl.learner import make_learner
+from getup_jax.runtime.checkpoint import save_learner
+from getup_jax.training import run
 
 STATE = {"none": np.zeros(1)}  # of a training that these tests do not go on with
 
@@ -118,10 +118,10 @@ def test_a_job_has_the_meta_policy_and_the_rehearsal(trained, monkeypatch, has_m
     composite = dataclasses.replace(config.composite, rehearse=rehearse)
     env = dataclasses.replace(built.environment, config=composite)
     made = dataclasses.replace(built, environment=env)
-    monkeypatch.setattr(train, "build_composite", lambda *_: made)
+    monkeypatch.setattr(run, "build_composite", lambda *_: made)
     monkeypatch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
     log: list[str] = []
-    _, job = train.build_composite_job(config, log.append)
+    _, job = run.build_composite_job(config, log.append)
     assert (job.prepare is not None) == rehearse
     assert any(f"meta policy: {path}" in line for line in log) == has_meta
     assert (job.learner.env is env) != has_meta

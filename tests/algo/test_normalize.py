@@ -4,8 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.algo import normalize
-from getup_jax.algo.normalize import Moments
+from getup_jax.rl import normalize
+from getup_jax.rl.normalize import Moments
 
 # Means and standard deviations far apart, as heights, angles and velocities are.
 MEAN = np.asarray([0.0, 1000.0, -3.0])

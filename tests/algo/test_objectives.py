@@ -10,11 +10,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from probes import Probe, make_world
 from tiny_composite import COMPOSITE, CONFIG, tiny_composite
 
-from getup_jax.algo.discriminator import Discriminator
-from getup_jax.algo.learner import Learner, make_learner
-from getup_jax.algo.objectives import Objectives, make_objectives
 from getup_jax.config import NetworkConfig, PPOConfig
+from getup_jax.envs.composite.discriminator_rewards import Objectives, make_objectives
 from getup_jax.physics.character import load_character
+from getup_jax.rl.discriminator import Discriminator
+from getup_jax.rl.learner import Learner, make_learner
 
 # what users run: with the quick options of conftest.py two programs may round differently
 AS_USERS = {"xla_backend_optimization_level": 3, "xla_cpu_use_fusion_emitters": True}
@@ -94,7 +94,7 @@ def judged(built):
 
 
 def _transition(output):
-    from getup_jax.algo.rollout import Transition
+    from getup_jax.rl.rollout import Transition
 
     terminated = output.terminated.at[0, 0].set(True)
     reward = jnp.where(terminated[..., None], -1.0, output.reward)

@@ -6,9 +6,9 @@ import numpy as np
 import optax
 import pytest
 
-from getup_jax.algo import popart
-from getup_jax.algo.popart import MOMENTUM, PopArt
-from getup_jax.nets.mlp import MLP
+from getup_jax.networks.mlp import MLP
+from getup_jax.rl import popart
+from getup_jax.rl.popart import MOMENTUM, PopArt
 
 MEAN = np.asarray([0.0, 1000.0, -3.0])
 STD = np.asarray([1.0, 0.1, 30.0])

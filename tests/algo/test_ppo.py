@@ -5,9 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.testing import assert_allclose
 
-from getup_jax.algo import ppo
-from getup_jax.algo.ppo import ActorTerms, Samples
-from getup_jax.nets import gaussian
+from getup_jax.networks import gaussian
+from getup_jax.rl import ppo
+from getup_jax.rl.ppo import ActorTerms, Samples
 
 N, K, A = 64, 3, 4
 CLIP = 0.2

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from probes import Probe, make_world
 
-from getup_jax.algo.rollout import Rollout, masked_mean, rollout, summarize
+from getup_jax.rl.rollout import Rollout, masked_mean, rollout, summarize
 
 T, B = 7, 6
 

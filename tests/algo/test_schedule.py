@@ -3,7 +3,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.algo import schedule
+from getup_jax.rl import schedule
 
 
 def test_five_stages_by_hand():

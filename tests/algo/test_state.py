@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.algo.state import owned
+from getup_jax.rl.state import owned
 
 
 def test_owned_arrays_are_strong_and_separate():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from getup_jax.algo.update import (
+from getup_jax.rl.minibatch import (
     ACTOR_EPSILON,
     FIRST_SCALE,
     adapt_scale,

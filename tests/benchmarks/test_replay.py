@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from tiny_task import CONFIG, tiny_task
 
-from getup_jax.algo.learner import make_learner
 from getup_jax.config import NetworkConfig, PhysicsConfig, PPOConfig
+from getup_jax.core.types import PropCommand
 from getup_jax.physics.character import load_character
 from getup_jax.physics.native import NativeEngine
 from getup_jax.physics.props import Ball, Equipment
-from getup_jax.types import PropCommand
+from getup_jax.rl.learner import make_learner
 from support.replay import BatchLoop, ReplayError, engine_of, make_script
 from support.scanned import recorded_of, scan_run
 

@@ -4,7 +4,7 @@ import pytest
 
 import throughput
 from getup_jax.config import Config, MotionConfig, PriorConfig
-from getup_jax.paths import shipped_configs
+from getup_jax.core.resources import shipped_configs
 from support.setting import LEAST_STARTS, QUICK_DROPS, make_config
 
 

@@ -9,16 +9,16 @@ import pytest
 from fake_writer import FakeWriter
 from tiny_composite import COMPOSITE, clips
 
-from getup_jax import video
-from getup_jax.composite import film
-from getup_jax.composite.episodes import CompositeEpisodes, Shown
 from getup_jax.config import ConfigError, PhysicsConfig
+from getup_jax.core.types import Kinematics
+from getup_jax.envs.composite.build import BuiltComposite
+from getup_jax.envs.composite.goals import make_goals
+from getup_jax.envs.composite.goals.target_location import LocationState
+from getup_jax.envs.composite.task import CompositeTask
+from getup_jax.evaluation import composite_film
+from getup_jax.evaluation import film as video
+from getup_jax.evaluation.composite_rollout import CompositeEpisodes, Shown
 from getup_jax.physics.character import load_character
-from getup_jax.tasks.build_composite import BuiltComposite
-from getup_jax.tasks.composite import CompositeTask
-from getup_jax.tasks.goals import make_goals
-from getup_jax.tasks.goals.target_location import LocationState
-from getup_jax.types import Kinematics
 
 FRAMES = 3
 
@@ -60,12 +60,12 @@ def episodes(built: BuiltComposite, place: tuple[float, float]) -> CompositeEpis
 
 
 def test_markers_follow_the_goals_step_by_step(built):
-    (first, *_, last) = film.markers(built.environment, episodes(built, (1.0, 2.0)), 0)
+    (first, *_, last) = composite_film.markers(built.environment, episodes(built, (1.0, 2.0)), 0)
     np.testing.assert_allclose(first[0].position, [1.0, 2.0, 0.0])
     assert first[0].rgba != last[0].rgba  # green once it is reached
     assert jax.tree.leaves(first) == first
     without = CompositeTask(FakeEngine(), built.environment.character, COMPOSITE, ())
-    assert film.markers(without, episodes(built, (0.0, 0.0)), 0) is None
+    assert composite_film.markers(without, episodes(built, (0.0, 0.0)), 0) is None
 
 
 def test_a_place_in_sight_is_in_the_picture(built, tmp_path, monkeypatch):
@@ -74,7 +74,7 @@ def test_a_place_in_sight_is_in_the_picture(built, tmp_path, monkeypatch):
         writer = FakeWriter()
         monkeypatch.setattr(video, "require", lambda found=writer: found)
         try:
-            film.film(tmp_path / "a.mp4", built, episodes(built, place))
+            composite_film.film(tmp_path / "a.mp4", built, episodes(built, place))
         except ConfigError as error:
             pytest.skip(str(error))
         assert len(writer.images) == FRAMES

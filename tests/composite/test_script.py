@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from getup_jax.composite.script import read_script
 from getup_jax.config import ConfigError
+from getup_jax.evaluation.steering_script import read_script
 
 GOOD = """\
 duration_s: 20

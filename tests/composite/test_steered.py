@@ -11,13 +11,13 @@ import pytest
 from numpy.testing import assert_allclose
 from tiny_composite import CONFIG, GROUPS
 
-from getup_jax.algo.learner import make_learner
-from getup_jax.checkpoint import load_policy, save_learner
-from getup_jax.cli import eval_main
-from getup_jax.composite.script import Command, Script
-from getup_jax.composite.steered import load_players, run_script
+from getup_jax.cli.main import eval_main
 from getup_jax.config import Config, ConfigError
-from getup_jax.tasks.build_composite import build_composite
+from getup_jax.envs.composite.build import build_composite
+from getup_jax.evaluation.steering import load_players, run_script
+from getup_jax.evaluation.steering_script import Command, Script
+from getup_jax.rl.learner import make_learner
+from getup_jax.runtime.checkpoint import load_policy, save_learner
 
 STATE = {"none": np.zeros(1)}  # of a training that nobody goes on with
 CLIPS = {"upper": ("wave",), "lower": ("squat",)}

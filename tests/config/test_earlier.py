@@ -3,10 +3,10 @@ from __future__ import annotations
 import pytest
 import yaml
 
-from getup_jax.checkpoint import load_policy
 from getup_jax.config import Config, ConfigError
 from getup_jax.config.earlier import THEN, completed
-from getup_jax.settings import dump_yaml, load_config, to_dict
+from getup_jax.config.load import dump_yaml, load_config, to_dict
+from getup_jax.runtime.checkpoint import load_policy
 
 
 def saved_then(**changes) -> dict:

@@ -17,9 +17,9 @@ from getup_jax.config import (
     TerrainConfig,
 )
 from getup_jax.config.check import shown
+from getup_jax.config.convert import section
+from getup_jax.config.load import to_dict
 from getup_jax.config.ranges import Range, check_numbers, number, range_of
-from getup_jax.convert import section
-from getup_jax.settings import to_dict
 
 GROUP = GroupConfig(links=("full",), clips=("walk",))
 # every optional section is in one of them, so that the walk comes to all of them

@@ -8,8 +8,8 @@ from browser import served
 from edit_running import Quick, running
 from edit_samples import make_curve, make_simulator
 
-from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.editor.simulate import Motion, Simulator
+from getup_jax.runtime.checkpoint import LoadedPolicy
 
 
 @pytest.fixture(scope="session")

@@ -9,13 +9,13 @@ import numpy as np
 from tiny_task import getups, neutral_prior
 
 from eval_samples import SMALL, save_policy
-from getup_jax.checkpoint import CHECKPOINTS, LoadedPolicy, load_policy, save_learner
 from getup_jax.config import Config, TerrainConfig
 from getup_jax.editor.options import edit_parser
 from getup_jax.editor.simulate import Simulator, editor_config
-from getup_jax.motion.curve_file import CurveFile
+from getup_jax.envs.getup.build import BuiltTask, assemble
+from getup_jax.motion.io.curve_file import CurveFile
 from getup_jax.physics.character import load_character
-from getup_jax.tasks.build import BuiltTask, assemble
+from getup_jax.runtime.checkpoint import CHECKPOINTS, LoadedPolicy, load_policy, save_learner
 
 SECONDS = 0.9
 

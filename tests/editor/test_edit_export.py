@@ -11,10 +11,10 @@ from getup_jax.config import ConfigError
 from getup_jax.editor import export as exports
 from getup_jax.editor.export import export
 from getup_jax.editor.simulate import link_poses
-from getup_jax.motion.bvh import read_bvh
-from getup_jax.motion.cache import read_npz
-from getup_jax.motion.curve_file import parse_text
-from getup_jax.motion.skeleton import forward, scaled
+from getup_jax.motion.io.bvh import read_bvh
+from getup_jax.motion.io.curve_file import parse_text
+from getup_jax.motion.io.recording import forward, scaled
+from getup_jax.motion.retarget.cache import read_npz
 
 MILLIMETRE = 0.001
 

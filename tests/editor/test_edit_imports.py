@@ -12,10 +12,10 @@ from getup_jax.config import PhysicsConfig
 from getup_jax.editor import imports
 from getup_jax.editor.export import export
 from getup_jax.editor.imports import curves_of
-from getup_jax.motion.apart import Stop
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.curve_file import dump, parse_text
-from getup_jax.motion.job import run_here
+from getup_jax.motion.io.curve_file import dump, parse_text
+from getup_jax.motion.retarget.job import run_here
+from getup_jax.motion.retarget.subprocess_job import Stop
 from getup_jax.physics.character import load_character
 
 

@@ -17,10 +17,10 @@ from getup_jax.editor import messages
 from getup_jax.editor.answers import answer
 from getup_jax.editor.messages import pack, read
 from getup_jax.editor.session import error_message
-from getup_jax.motion.apart import Stop
-from getup_jax.motion.cache import write_npz
 from getup_jax.motion.clips import Clip
-from getup_jax.motion.retarget import RetargetReport
+from getup_jax.motion.retarget.cache import write_npz
+from getup_jax.motion.retarget.retarget import RetargetReport
+from getup_jax.motion.retarget.subprocess_job import Stop
 from getup_jax.physics.character import load_character
 
 PLAIN = {"number": 1, "curve": CURVE, "slot": 0, "region": 0, "place": 0}

@@ -7,10 +7,10 @@ import json
 import numpy as np
 from browser import BROWSER, HEIGHT, drag, edited, opened, saved, shot, value
 
-from getup_jax import cli
-from getup_jax.motion.bvh import read_bvh
-from getup_jax.motion.curve_file import read_curve_file
-from getup_jax.motion.skeleton import forward, scaled
+from getup_jax.cli import main
+from getup_jax.motion.io.bvh import read_bvh
+from getup_jax.motion.io.curve_file import read_curve_file
+from getup_jax.motion.io.recording import forward, scaled
 
 MILLIMETRE = 0.001
 
@@ -33,7 +33,7 @@ def test_what_is_saved_opens_again_and_evaluates_the_same(page_server, tmp_path)
         assert page.inner_text("#scores") == scores
     assert read_curve_file(file).values[5, 0] == moved
     out = tmp_path / "out.json"
-    assert cli.eval_main(["--curves", str(file), "--json", str(out)]) == 0
+    assert main.eval_main(["--curves", str(file), "--json", str(out)]) == 0
     found = json.loads(out.read_text())
     assert found["success"] == float(verdict.startswith("Stands"))
     assert f"height error {found['height_error_m']:.3f} m" in scores

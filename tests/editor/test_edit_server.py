@@ -11,7 +11,7 @@ import time
 import pytest
 from edit_running import CURVE, Quick, Running, ask, get, request, running, socket
 
-from getup_jax import cli
+from getup_jax.cli import main
 from getup_jax.editor import messages, server
 from getup_jax.editor.site import PAGE
 
@@ -85,7 +85,7 @@ def test_what_goes_wrong_at_the_start_ends_the_server_with_its_reason():
 
 def test_a_port_in_use_is_said(site, capsys, monkeypatch):
     monkeypatch.setattr(server.checkpoint, "load_policy", lambda path: None)
-    assert cli.edit_main(["--port", str(site.port)]) == 2
+    assert main.edit_main(["--port", str(site.port)]) == 2
     error = capsys.readouterr().err
     assert error.startswith(f"EditorError: port {site.port}: in use on 127.0.0.1; give another")
 
@@ -102,6 +102,6 @@ def test_a_port_in_use_is_said(site, capsys, monkeypatch):
 )
 def test_bad_arguments_are_refused(arguments, text, capsys):
     with pytest.raises(SystemExit) as caught:
-        cli.edit_main(arguments)
+        main.edit_main(arguments)
     assert caught.value.code == 2
     assert text in capsys.readouterr().err

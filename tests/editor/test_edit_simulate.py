@@ -10,17 +10,17 @@ from ground_samples import TERRAIN
 from tiny_task import getups, neutral_prior
 
 from eval_samples import make_policy
-from getup_jax.conditions import Conditions, drawn, make_plan
+from getup_jax.core.types import take
 from getup_jax.editor.scene import ground
 from getup_jax.editor.simulate import Frames, Motion
 from getup_jax.editor.starts import Place, lies, reference_curve
-from getup_jax.episodes import CHUNK, run_episodes
+from getup_jax.envs.getup.build import assemble
+from getup_jax.envs.getup.resets import region_pool
+from getup_jax.evaluation.metrics import episode_values
+from getup_jax.evaluation.rollout import CHUNK, run_episodes
+from getup_jax.evaluation.scenario import Conditions, drawn, make_plan
 from getup_jax.motion.clips import MotionError
 from getup_jax.physics.character import load_character
-from getup_jax.scores import episode_values
-from getup_jax.tasks import region_pool
-from getup_jax.tasks.build import assemble
-from getup_jax.types import take
 
 
 def test_frames_come_in_chunks_and_then_the_whole_motion(simulator):

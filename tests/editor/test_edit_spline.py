@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from getup_jax.editor.site import PAGE
-from getup_jax.motion import curves
+from getup_jax.motion.getup import curves
 
 NODE = shutil.which("node")
 SCRIPT = """

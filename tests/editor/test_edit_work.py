@@ -12,12 +12,12 @@ import types
 import pytest
 from edit_running import CURVE, Quick, request, running, socket
 
-from getup_jax import video
 from getup_jax.config import PhysicsConfig
 from getup_jax.editor import export
 from getup_jax.editor.messages import pack
 from getup_jax.editor.work import SLOW
-from getup_jax.motion.apart import AbandonedError, Stop
+from getup_jax.evaluation import film
+from getup_jax.motion.retarget.subprocess_job import AbandonedError, Stop
 from getup_jax.physics.character import load_character
 
 CHARACTER = load_character(PhysicsConfig())
@@ -139,9 +139,9 @@ def test_a_film_that_nobody_waits_for_ends_between_two_pictures(monkeypatch, tmp
 
     writer = contextlib.nullcontext(Writer())
     imageio = types.SimpleNamespace(get_writer=lambda *_, **__: writer)
-    monkeypatch.setattr(video, "require", lambda: imageio)
-    monkeypatch.setattr(video, "pictures", lambda *_: iter(range(1000)))
-    monkeypatch.setattr(video, "caption", lambda image, text: image)
+    monkeypatch.setattr(film, "require", lambda: imageio)
+    monkeypatch.setattr(film, "pictures", lambda *_: iter(range(1000)))
+    monkeypatch.setattr(film, "caption", lambda image, text: image)
     frames = types.SimpleNamespace(qpos=None)
     motion = types.SimpleNamespace(
         frames=frames, control_dt=0.1, curve=types.SimpleNamespace(name=CURVE["name"])

@@ -9,12 +9,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from getup_jax.motion.axes import shortest_turn
-from getup_jax.motion.cache import read_npz
-from getup_jax.motion.command import main
-from getup_jax.motion.identify import identify
-from getup_jax.motion.readers import read_motion
-from getup_jax.motion.skeleton import Recording
+from getup_jax.cli.motion import main
+from getup_jax.motion.io.readers import read_motion
+from getup_jax.motion.io.recording import Recording
+from getup_jax.motion.retarget.axes import shortest_turn
+from getup_jax.motion.retarget.cache import read_npz
+from getup_jax.motion.retarget.identify import identify
 
 # name, parent, OFFSET (cm, Y up): a T-pose, facing +z
 SKELETON: tuple[tuple[str, str, tuple[float, float, float]], ...] = (

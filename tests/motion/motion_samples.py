@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from getup_jax.motion.clips import Clip
-from getup_jax.motion.skeleton import Recording
+from getup_jax.motion.io.recording import Recording
 
 SUPINE = Rotation.from_euler("y", -90, degrees=True)
 PRONE = Rotation.from_euler("y", 90, degrees=True)

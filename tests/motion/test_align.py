@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from getup_jax.motion.align import FEATURE_SCALE, warp
+from getup_jax.motion.getup.curve_alignment import FEATURE_SCALE, warp
 
 
 def ramp(count: int) -> np.ndarray:

@@ -12,11 +12,11 @@ import time
 import pytest
 
 from getup_jax.config import PhysicsConfig
-from getup_jax.motion.apart import AbandonedError, Stop, run_apart
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.job import Job
-from getup_jax.motion.readers import ReadOptions
-from getup_jax.motion.retarget import RetargetSettings
+from getup_jax.motion.io.readers import ReadOptions
+from getup_jax.motion.retarget.job import Job
+from getup_jax.motion.retarget.retarget import RetargetSettings
+from getup_jax.motion.retarget.subprocess_job import AbandonedError, Stop, run_apart
 from getup_jax.physics.character import load_character
 
 CHARACTER = load_character(PhysicsConfig())

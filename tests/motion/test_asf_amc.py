@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.readers import read_motion
-from getup_jax.motion.skeleton import forward
+from getup_jax.motion.io.readers import read_motion
+from getup_jax.motion.io.recording import forward
 
 ASF = """\
 :version 1.10

@@ -4,12 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from getup_jax.motion import curves
-from getup_jax.motion.authored import clip_features, read_drawn
+from getup_jax.core.resources import asset_path
+from getup_jax.motion.authoring.contact_ik import CONTACT_NAMES, Planter, geom_bottoms
+from getup_jax.motion.authoring.keyframes import authored_poses, load_authored, read_keyframes
+from getup_jax.motion.authoring.library import clip_features, read_drawn
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.keyframes import authored_poses, load_authored, read_keyframes
-from getup_jax.motion.planting import CONTACT_NAMES, Planter, geom_bottoms
-from getup_jax.paths import asset_path
+from getup_jax.motion.getup import curves
 
 NAMES = sorted(path.stem for path in asset_path("motions").glob("*.yaml"))
 DRAWN = sorted(path.stem for path in asset_path("curves").glob("*.yaml"))

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from getup_jax.motion.axes import frame_of, shortest_turn
+from getup_jax.motion.retarget.axes import frame_of, shortest_turn
 
 
 @pytest.mark.parametrize("seed", range(5))

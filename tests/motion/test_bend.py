@@ -10,14 +10,14 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from getup_jax.config import CompositeConfig, ConfigError, GroupConfig, PhysicsConfig
-from getup_jax.motion.bend import bent
+from getup_jax.envs.composite.build import load_clips
+from getup_jax.envs.composite.reference_state_init import families
+from getup_jax.motion.authoring.contact_ik import Planter
+from getup_jax.motion.authoring.loops import is_loop, repeated
+from getup_jax.motion.authoring.path_editing import bent
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.loops import is_loop, repeated
 from getup_jax.motion.named_clips import named_clips
-from getup_jax.motion.planting import Planter
 from getup_jax.physics.character import CharacterSpec, load_character
-from getup_jax.tasks.build_composite import load_clips
-from getup_jax.tasks.clip_starts import families
 
 TURN = 0.8  # rad/s
 

@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 from bvh_samples import human_bvh, write
 
-from getup_jax.motion.bones import bone_length, guess_unit, leg_lengths, require_body
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.identify import identify
-from getup_jax.motion.readers import read_motion
-from getup_jax.motion.skeleton import rest_positions, scaled
+from getup_jax.motion.io.readers import read_motion
+from getup_jax.motion.io.recording import rest_positions, scaled
+from getup_jax.motion.retarget.bone_lengths import (
+    bone_length,
+    guess_unit,
+    leg_lengths,
+    require_body,
+)
+from getup_jax.motion.retarget.identify import identify
 
 NOTHING = (0.0, 0.0, 0.0)
 

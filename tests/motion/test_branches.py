@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from motion_samples import getup_clip
 
-from getup_jax.motion.branches import nearer_branches
 from getup_jax.motion.clips import Clip
-from getup_jax.motion.events import link_positions
+from getup_jax.motion.getup.events import link_positions
+from getup_jax.motion.retarget.ik_branches import nearer_branches
 
 FPS = 30.0
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from motion_samples import TINY_BVH, random_pose
 
-from getup_jax.motion.body import record
-from getup_jax.motion.bvh import BvhOptions, read_bvh
-from getup_jax.motion.bvh_writer import write_bvh
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.skeleton import forward
+from getup_jax.motion.io.bvh import BvhOptions, read_bvh
+from getup_jax.motion.io.bvh_writer import write_bvh
+from getup_jax.motion.io.recording import forward
+from getup_jax.motion.retarget.body import record
 
 Z_UP = BvhOptions(up="z")
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from getup_jax.motion.command import main
+from getup_jax.cli.motion import main
 
 # of Python, of ours, and of what ours imports
 SHADOWED = ("numpy", "scipy", "yaml", "mujoco", "pickle", "json", "getup_jax")

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from bvh_samples import BASE, along_x, human_bvh, write
 
-from getup_jax.motion.calibrate import anatomical_frames
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.events import link_positions
-from getup_jax.motion.identify import identify
-from getup_jax.motion.readers import read_motion
-from getup_jax.motion.retarget import RetargetSettings, retarget
+from getup_jax.motion.getup.events import link_positions
+from getup_jax.motion.io.readers import read_motion
+from getup_jax.motion.retarget.calibrate import anatomical_frames
+from getup_jax.motion.retarget.identify import identify
+from getup_jax.motion.retarget.retarget import RetargetSettings, retarget
 
 COLLARS = {"LeftShoulder": (0, 10, 0), "RightShoulder": (0, 10, 0)}
 COLLARS |= {"LeftArm": (17, 0, 0), "RightArm": (-17, 0, 0)}

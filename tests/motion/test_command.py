@@ -5,10 +5,10 @@ import json
 import pytest
 from motion_samples import SUPINE, getup_clip
 
-from getup_jax.motion.body import record
-from getup_jax.motion.bvh_writer import write_bvh
+from getup_jax.cli.motion import main
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.command import main
+from getup_jax.motion.io.bvh_writer import write_bvh
+from getup_jax.motion.retarget.body import record
 
 
 @pytest.fixture

@@ -7,10 +7,11 @@ import pytest
 import yaml
 
 from getup_jax.config import MotionConfig, PhysicsConfig
-from getup_jax.motion import curve_file, library
+from getup_jax.core.resources import asset_path
+from getup_jax.motion import library
 from getup_jax.motion.clips import Clip, GetUp, MotionError
-from getup_jax.motion.curve_file import dump, parse_text, read_curve_file
-from getup_jax.paths import asset_path
+from getup_jax.motion.io import curve_file
+from getup_jax.motion.io.curve_file import dump, parse_text, read_curve_file
 from getup_jax.physics.character import load_character
 
 TEXT = asset_path("curves", "prone_push_up_kneel.yaml").read_text(encoding="utf-8")

@@ -7,12 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.dtw import (
-    heading_positions,
-    imitation_error,
-    link_distances,
-    warped_cost,
-)
+from getup_jax.motion.dtw import heading_positions, imitation_error, link_distances, warped_cost
 
 
 def wave(times: np.ndarray) -> np.ndarray:

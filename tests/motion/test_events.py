@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from motion_samples import PRONE, SUPINE, getup_clip
 
-from getup_jax.motion.cache import Job, retarget_files
 from getup_jax.motion.clips import GetUp, MotionError
-from getup_jax.motion.curves import NUM_POINTS
-from getup_jax.motion.events import (
+from getup_jax.motion.getup.curves import NUM_POINTS
+from getup_jax.motion.getup.events import (
     EventSettings,
     Heights,
     find_events,
@@ -17,10 +16,11 @@ from getup_jax.motion.events import (
     link_positions,
     orientation,
 )
-from getup_jax.motion.getups import clip_features, cut_getup, find_getups, flat_time
-from getup_jax.motion.readers import ReadOptions
-from getup_jax.motion.retarget import RetargetSettings
-from getup_jax.motion.strategies import OTHER, STRATEGIES
+from getup_jax.motion.getup.getups import clip_features, cut_getup, find_getups, flat_time
+from getup_jax.motion.getup.strategies import OTHER, STRATEGIES
+from getup_jax.motion.io.readers import ReadOptions
+from getup_jax.motion.retarget.cache import Job, retarget_files
+from getup_jax.motion.retarget.retarget import RetargetSettings
 
 
 def ramp(*parts):

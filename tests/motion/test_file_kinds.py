@@ -20,11 +20,11 @@ from bvh_samples import (
     write,
 )
 
-from getup_jax.motion.bvh import Y_UP
-from getup_jax.motion.bvh_writer import write_bvh
-from getup_jax.motion.identify import identify
-from getup_jax.motion.readers import read_motion
-from getup_jax.motion.skeleton import turned
+from getup_jax.motion.io.bvh import Y_UP
+from getup_jax.motion.io.bvh_writer import write_bvh
+from getup_jax.motion.io.readers import read_motion
+from getup_jax.motion.io.recording import turned
+from getup_jax.motion.retarget.identify import identify
 
 PROP = "ROOT Sword\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n}\n"
 KEYWORD = re.compile(r"^\s*(HIERARCHY|ROOT|JOINT|OFFSET|CHANNELS|End Site|MOTION|Frame\w*)", re.M)

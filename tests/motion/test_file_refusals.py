@@ -19,7 +19,7 @@ from bvh_samples import (
 )
 
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.readers import read_motion
+from getup_jax.motion.io.readers import read_motion
 
 
 def zero(*names):

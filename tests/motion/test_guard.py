@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from getup_jax.config import ConfigError
-from getup_jax.motion import readers
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.guard import one_line
-from getup_jax.motion.readers import SUFFIXES, read_motion
+from getup_jax.motion.io import readers
+from getup_jax.motion.io.guard import one_line
+from getup_jax.motion.io.readers import SUFFIXES, read_motion
 
 
 @pytest.mark.parametrize(

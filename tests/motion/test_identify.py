@@ -7,8 +7,8 @@ import pytest
 from bvh_samples import BASE, NAMES, write
 
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.identify import identify
-from getup_jax.motion.readers import read_motion
+from getup_jax.motion.io.readers import read_motion
+from getup_jax.motion.retarget.identify import identify
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.deepmimic import COLUMNS
-from getup_jax.motion.readers import motion_files, read_motion
-from getup_jax.motion.skeleton import forward
+from getup_jax.motion.io.deepmimic import COLUMNS
+from getup_jax.motion.io.readers import motion_files, read_motion
+from getup_jax.motion.io.recording import forward
 
 IDENTITY = [0.0, 0.0, 0.0, 1.0]
 

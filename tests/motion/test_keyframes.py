@@ -4,14 +4,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from getup_jax.motion.clips import MotionError
-from getup_jax.motion.keyframes import (
+from getup_jax.motion.authoring.contact_ik import Planter, contacts_of, geom_bottoms
+from getup_jax.motion.authoring.keyframes import (
     Keyframe,
     KeyframeMotion,
     clip_from_keyframes,
     read_keyframes,
 )
-from getup_jax.motion.planting import Planter, contacts_of, geom_bottoms
+from getup_jax.motion.clips import MotionError
 
 GOOD = """
 name: nod

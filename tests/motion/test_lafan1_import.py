@@ -11,9 +11,9 @@ import json
 import numpy as np
 import pytest
 
-from getup_jax.motion.command import main
+from getup_jax.cli.motion import main
+from getup_jax.config.load import load_config
 from getup_jax.motion.library import load_motions
-from getup_jax.settings import load_config
 
 pytestmark = pytest.mark.slow
 TOLERANCE_FRAMES = 15  # .5 s at 30 fps

@@ -8,12 +8,12 @@ from motion_samples import PRONE, SUPINE, getup_clip
 
 from getup_jax.config import MotionConfig
 from getup_jax.motion import library
-from getup_jax.motion.body import record
-from getup_jax.motion.bvh_writer import write_bvh
-from getup_jax.motion.cache import Job, key, read_npz, retarget_files, write_npz
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.readers import ReadOptions
-from getup_jax.motion.retarget import RetargetSettings
+from getup_jax.motion.io.bvh_writer import write_bvh
+from getup_jax.motion.io.readers import ReadOptions
+from getup_jax.motion.retarget.body import record
+from getup_jax.motion.retarget.cache import Job, key, read_npz, retarget_files, write_npz
+from getup_jax.motion.retarget.retarget import RetargetSettings
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from getup_jax.config import PhysicsConfig
+from getup_jax.core.resources import asset_path
+from getup_jax.motion.authoring.contact_ik import Planter
+from getup_jax.motion.authoring.keyframes import KeyframeMotion, clip_from_keyframes, read_keyframes
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.keyframes import KeyframeMotion, clip_from_keyframes, read_keyframes
-from getup_jax.motion.planting import Planter
-from getup_jax.motion.readers import read_motion
-from getup_jax.motion.retarget import retarget
-from getup_jax.paths import asset_path
+from getup_jax.motion.io.readers import read_motion
+from getup_jax.motion.retarget.retarget import retarget
 from getup_jax.physics.character import CharacterSpec, load_character
 
 FOLDER = asset_path("motions", "composite")

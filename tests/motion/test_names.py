@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.names import map_names, read_map, require_links, unknown_joints
+from getup_jax.motion.retarget.joint_names import map_names, read_map, require_links, unknown_joints
 
 LAFAN = ["Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToe", "Spine", "Spine1", "Spine2"]
 LAFAN += ["Neck", "Head", "LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand"]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from getup_jax.config import PhysicsConfig
-from getup_jax.motion.cache import read_npz, write_npz
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.npz import read_arrays
-from getup_jax.motion.retarget import RetargetReport
+from getup_jax.motion.io.npz import read_arrays
+from getup_jax.motion.retarget.cache import read_npz, write_npz
+from getup_jax.motion.retarget.retarget import RetargetReport
 from getup_jax.physics.character import load_character
 
 CHARACTER = load_character(PhysicsConfig())

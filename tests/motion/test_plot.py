@@ -7,8 +7,8 @@ import pytest
 from motion_samples import PRONE, SUPINE, getup_clip
 
 from getup_jax.motion.clips import GetUp, MotionError
-from getup_jax.motion.plot import class_curves, plot_strategies, strategy_curves
-from getup_jax.motion.strategies import OTHER
+from getup_jax.motion.getup.plot import class_curves, plot_strategies, strategy_curves
+from getup_jax.motion.getup.strategies import OTHER
 
 
 def getup(character, points, lying=SUPINE, clip=True):

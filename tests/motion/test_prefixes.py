@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 from bvh_samples import NAMES
 
-from getup_jax.motion.names import map_names
-from getup_jax.motion.prefixes import without_prefix
+from getup_jax.motion.retarget.joint_names import map_names
+from getup_jax.motion.retarget.name_prefixes import without_prefix
 
 LEFT = [name for name in NAMES if name.startswith("Left")]
 

@@ -8,16 +8,16 @@ import pytest
 from motion_samples import PRONE, SUPINE, getup_clip, random_pose
 from scipy.spatial.transform import Rotation
 
-from getup_jax.motion.body import body_of, record
-from getup_jax.motion.bones import guess_unit
-from getup_jax.motion.bvh import BvhOptions, read_bvh
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.events import link_positions
-from getup_jax.motion.names import map_names
-from getup_jax.motion.readers import read_motion
-from getup_jax.motion.retarget import RetargetSettings, lift, retarget, starts_in_t_pose
-from getup_jax.motion.skeleton import cut, scaled
-from getup_jax.motion.solver import SolverSettings
+from getup_jax.motion.getup.events import link_positions
+from getup_jax.motion.io.bvh import BvhOptions, read_bvh
+from getup_jax.motion.io.readers import read_motion
+from getup_jax.motion.io.recording import cut, scaled
+from getup_jax.motion.retarget.body import body_of, record
+from getup_jax.motion.retarget.bone_lengths import guess_unit
+from getup_jax.motion.retarget.joint_names import map_names
+from getup_jax.motion.retarget.retarget import RetargetSettings, lift, retarget, starts_in_t_pose
+from getup_jax.motion.retarget.solver import SolverSettings
 
 # Our own character as the source needs no scaling, and no pull away from the exact answer.
 EXACT = RetargetSettings(floor=0.0, solver=SolverSettings(previous=1e-9, rest=1e-9, tolerance=1e-6))

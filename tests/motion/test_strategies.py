@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from getup_jax.motion import strategies
+from getup_jax.motion.getup import strategies
 
 LINKS = ("thigh_l", "thigh_r", "neck", "pelvis", "hand_l", "hand_r", "shin_l", "shin_r")
 SIZE = 0.92

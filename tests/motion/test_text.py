@@ -2,9 +2,17 @@ from __future__ import annotations
 
 import pytest
 
-from getup_jax.motion import text
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.text import decode, number, read_bytes, read_json, read_lines, read_text, said
+from getup_jax.motion.io import text
+from getup_jax.motion.io.text import (
+    decode,
+    number,
+    read_bytes,
+    read_json,
+    read_lines,
+    read_text,
+    said,
+)
 
 GERMAN, FRENCH, JAPANESE = "Größe Fuß", "Tête œil", "左足ボーン 首 頭"
 

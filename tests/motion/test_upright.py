@@ -8,12 +8,12 @@ from bvh_samples import BASE, along_x, write
 from motion_samples import two_bones
 from scipy.spatial.transform import Rotation
 
-from getup_jax.motion.bvh import Y_UP, BvhOptions, read_bvh
-from getup_jax.motion.bvh_writer import write_bvh
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.readers import read_motion
-from getup_jax.motion.skeleton import forward, turned
-from getup_jax.motion.upright import vertical_axis
+from getup_jax.motion.io.bvh import Y_UP, BvhOptions, read_bvh
+from getup_jax.motion.io.bvh_writer import write_bvh
+from getup_jax.motion.io.readers import read_motion
+from getup_jax.motion.io.recording import forward, turned
+from getup_jax.motion.retarget.up_axis import vertical_axis
 
 
 @pytest.fixture

@@ -7,10 +7,10 @@ import functools
 import numpy as np
 
 from getup_jax.config import PhysicsConfig, PriorConfig
-from getup_jax.nets.prior import PosePrior
-from getup_jax.nets.prior_data import PoseSet, make_pose_set
-from getup_jax.nets.prior_training import PriorReport, train_prior
 from getup_jax.physics.character import CharacterSpec, load_character
+from getup_jax.pose_prior.data import PoseSet, make_pose_set
+from getup_jax.pose_prior.prior import PosePrior
+from getup_jax.pose_prior.training import PriorReport, train_prior
 
 # A small network with a high learning rate reaches in seconds what the defaults reach in minutes.
 QUICK = PriorConfig(

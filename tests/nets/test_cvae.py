@@ -5,7 +5,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from getup_jax.nets.cvae import CVAE, MIN_STD, init_variables, kl_to_standard_normal, loss_terms
+from getup_jax.pose_prior.cvae import (
+    CVAE,
+    MIN_STD,
+    init_variables,
+    kl_to_standard_normal,
+    loss_terms,
+)
 
 JOINTS, LATENT, ROWS = 5, 3, 8
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from pose_samples import QUICK, character, manifold_poses
 
-from getup_jax import mirror
-from getup_jax.nets import cvae, prior_cache
-from getup_jax.nets import prior as pose_prior
-from getup_jax.nets.prior import PosePrior
-from getup_jax.nets.prior_data import PoseSet, make_pose_set, split
-from getup_jax.nets.prior_training import train_prior
+from getup_jax.core import mirror
 from getup_jax.physics.mirror_image import joint_mirror
+from getup_jax.pose_prior import cache, cvae
+from getup_jax.pose_prior import prior as pose_prior
+from getup_jax.pose_prior.data import PoseSet, make_pose_set, split
+from getup_jax.pose_prior.prior import PosePrior
+from getup_jax.pose_prior.training import train_prior
 
 BRIEF = dataclasses.replace(QUICK, min_updates=60)
 
@@ -90,12 +90,12 @@ def test_the_setting_switches_it_off_and_other_priors_keep_their_names(poses):
     assert not train_prior(poses, plain)[0].mirrored
     lopsided = dataclasses.replace(poses, mirror=None)  # a body without an image
     assert not train_prior(lopsided, dataclasses.replace(plain, mirror=True))[0].mirrored
-    name = prior_cache.fingerprint(poses, plain)
-    assert prior_cache.fingerprint(lopsided, plain) == name
-    assert prior_cache.fingerprint(lopsided, BRIEF) == prior_cache.fingerprint(
+    name = cache.fingerprint(poses, plain)
+    assert cache.fingerprint(lopsided, plain) == name
+    assert cache.fingerprint(lopsided, BRIEF) == cache.fingerprint(
         lopsided, dataclasses.replace(BRIEF, mirror=False)
     )
-    assert prior_cache.fingerprint(poses, dataclasses.replace(plain, mirror=True)) != name
+    assert cache.fingerprint(poses, dataclasses.replace(plain, mirror=True)) != name
 
 
 def test_a_mirrored_model_needs_the_image():

@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from getup_jax.mirror import CURVE, POLAR, QUATERNION, concatenated, signed, vectors
-from getup_jax.nets.equivariant import EquivariantMLP, joined, parts, sizes
+from getup_jax.core.mirror import CURVE, POLAR, QUATERNION, concatenated, signed, vectors
+from getup_jax.networks.equivariant import EquivariantMLP, joined, parts, sizes
 
 SEEN = concatenated([vectors([1, 0], signed(POLAR)), CURVE, signed(QUATERNION)])
 DONE = concatenated([vectors([1, 0, 2], signed([1.0, -1.0])), signed([1.0])])

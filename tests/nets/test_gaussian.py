@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy import stats
 
-from getup_jax.nets import gaussian
+from getup_jax.networks import gaussian
 
 STD = np.asarray([0.5, 1.0, 2.0], np.float32)
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.config import NetworkConfig
-from getup_jax.nets.mlp import ACTIVATIONS, MLP, OUTPUT_LAYER
+from getup_jax.networks.mlp import ACTIVATIONS, MLP, OUTPUT_LAYER
 
 INPUTS = 6
 

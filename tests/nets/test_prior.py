@@ -8,10 +8,10 @@ import pytest
 from flax import serialization
 from pose_samples import QUICK, pose_set, quick_prior
 
-from getup_jax.nets import prior as pose_prior
-from getup_jax.nets.cvae import CVAE
-from getup_jax.nets.prior import MIN_LATENT_STD, PosePrior
-from getup_jax.nets.prior_training import train_prior
+from getup_jax.pose_prior import prior as pose_prior
+from getup_jax.pose_prior.cvae import CVAE
+from getup_jax.pose_prior.prior import MIN_LATENT_STD, PosePrior
+from getup_jax.pose_prior.training import train_prior
 
 
 def sample(rows: slice = slice(0, 200)) -> tuple[jax.Array, jax.Array]:

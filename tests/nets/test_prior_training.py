@@ -6,18 +6,19 @@ import pytest
 from pose_samples import QUICK, character, manifold_poses, pose_set, quick_prior
 
 from getup_jax.config import MotionConfig, PriorConfig
+from getup_jax.core.resources import asset_path
 from getup_jax.motion.library import load_motions
-from getup_jax.nets import prior as pose_prior
-from getup_jax.nets import prior_cache, prior_report
-from getup_jax.nets.prior_data import BLOCK, PoseSet, blocks, make_pose_set, pose_conditions, split
-from getup_jax.nets.prior_training import (
+from getup_jax.pose_prior import cache
+from getup_jax.pose_prior import prior as pose_prior
+from getup_jax.pose_prior import report as prior_report
+from getup_jax.pose_prior.data import BLOCK, PoseSet, blocks, make_pose_set, pose_conditions, split
+from getup_jax.pose_prior.training import (
     PROGRESS_CALLS,
     Recipe,
     limit_check,
     pca_variance,
     train_prior,
 )
-from getup_jax.paths import asset_path
 
 BRIEF = dataclasses.replace(QUICK, min_updates=30)
 
@@ -172,9 +173,9 @@ def test_limit_check_counts_angles_and_poses():
 
 
 def test_a_cached_prior_is_read_and_not_trained_again(tmp_path, monkeypatch):
-    prior, report = prior_cache.cached_prior(small_set(), BRIEF, tmp_path, lambda _: None)
-    monkeypatch.setattr(prior_cache, "train_prior", None)
-    again, same = prior_cache.cached_prior(small_set(), BRIEF, tmp_path)
+    prior, report = cache.cached_prior(small_set(), BRIEF, tmp_path, lambda _: None)
+    monkeypatch.setattr(cache, "train_prior", None)
+    again, same = cache.cached_prior(small_set(), BRIEF, tmp_path)
     assert same == report
     one, two = pose_prior.to_dict(prior), pose_prior.to_dict(again)
     np.testing.assert_array_equal(one["latent_std"], two["latent_std"])
@@ -187,7 +188,7 @@ def test_a_cached_prior_is_read_and_not_trained_again(tmp_path, monkeypatch):
 @pytest.mark.parametrize("damage", ["cut", "empty", "gone"])
 def test_a_damaged_cache_is_made_again(tmp_path, suffix, damage):
     config = dataclasses.replace(BRIEF, min_updates=1)
-    prior, _ = prior_cache.cached_prior(small_set(), config, tmp_path, lambda _: None)
+    prior, _ = cache.cached_prior(small_set(), config, tmp_path, lambda _: None)
     (file,) = tmp_path.glob(f"*{suffix}")
     whole = file.read_bytes()
     if damage == "gone":
@@ -195,40 +196,40 @@ def test_a_damaged_cache_is_made_again(tmp_path, suffix, damage):
     else:
         file.write_bytes(whole[: len(whole) // 2] if damage == "cut" else b"")
     lines = []
-    again, _ = prior_cache.cached_prior(small_set(), config, tmp_path, lines.append)
+    again, _ = cache.cached_prior(small_set(), config, tmp_path, lines.append)
     np.testing.assert_array_equal(prior.latent_mean, again.latent_mean)
     if (suffix, damage) != (".npz", "gone"):
         assert "damaged" in lines[0]
     lines.clear()
-    prior_cache.cached_prior(small_set(), config, tmp_path, lines.append)
+    cache.cached_prior(small_set(), config, tmp_path, lines.append)
     assert lines == []
 
 
 def test_other_poses_or_settings_are_another_prior():
     poses = small_set()
     prints = {
-        prior_cache.fingerprint(poses, BRIEF),
-        prior_cache.fingerprint(poses, dataclasses.replace(BRIEF, seed=1)),
-        prior_cache.fingerprint(dataclasses.replace(poses, angles=poses.angles + 1e-3), BRIEF),
-        prior_cache.fingerprint(dataclasses.replace(poses, group=poses.group[::-1]), BRIEF),
+        cache.fingerprint(poses, BRIEF),
+        cache.fingerprint(poses, dataclasses.replace(BRIEF, seed=1)),
+        cache.fingerprint(dataclasses.replace(poses, angles=poses.angles + 1e-3), BRIEF),
+        cache.fingerprint(dataclasses.replace(poses, group=poses.group[::-1]), BRIEF),
     }
     assert len(prints) == 4
-    assert prior_cache.fingerprint(small_set(), BRIEF) in prints
+    assert cache.fingerprint(small_set(), BRIEF) in prints
 
 
 @pytest.mark.parametrize("name", ["last_rate", "weight_decay", "input_noise"])
 def test_settings_that_came_later_name_another_prior_once_they_are_used(name):
     used = dataclasses.replace(BRIEF, **{name: 0.25})
     poses = small_set()
-    assert prior_cache.fingerprint(poses, used) != prior_cache.fingerprint(poses, BRIEF)
+    assert cache.fingerprint(poses, used) != cache.fingerprint(poses, BRIEF)
 
 
 def test_the_shipped_priors_belong_to_the_shipped_motions_and_the_default_settings():
     poses = load_motions(MotionConfig(), character()).poses
     both = make_pose_set(poses, character(), mirrored=True)
     for mirrored in (True, False):
-        name = prior_cache.fingerprint(both, PriorConfig(mirror=mirrored))
-        prior, report = prior_cache.load_prior(asset_path("priors", f"prior-{name}.npz"))
+        name = cache.fingerprint(both, PriorConfig(mirror=mirrored))
+        prior, report = cache.load_prior(asset_path("priors", f"prior-{name}.npz"))
         assert prior.num_joints == character().num_joints
         assert prior.mirrored == mirrored
         assert report.heldout_rmse_deg < 2.6

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 from numpy.testing import assert_allclose
 
-from getup_jax.nets.recurrent import GRU, HistoryMLP
+from getup_jax.networks.recurrent import GRU, HistoryMLP
 
 FRAMES = np.random.default_rng(0).normal(size=(5, 4, 3)).astype(np.float32)
 

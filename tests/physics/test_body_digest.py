@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from getup_jax.config import PhysicsConfig, TerrainConfig
-from getup_jax.paths import asset_path
+from getup_jax.config.load import load_saved_config
+from getup_jax.core.resources import asset_path
+from getup_jax.envs.composite.build import equipment_of
 from getup_jax.physics.body_digest import KEY, body_digest, warn_if_other
 from getup_jax.physics.character import load_character
 from getup_jax.physics.props import Equipment
 from getup_jax.physics.terrain_map import make_terrain
-from getup_jax.settings import load_saved_config
-from getup_jax.tasks.build_composite import equipment_of
 
 OWN = asset_path("humanoid49.xml").read_text()
 

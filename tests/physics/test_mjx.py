@@ -17,11 +17,11 @@ import pytest
 from poses import clipped, lying
 
 from getup_jax.config import ConfigError, PhysicsConfig
+from getup_jax.core.types import Kinematics, PhysicsState
 from getup_jax.physics import mjx as mjx_module
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.engine import make_engine
 from getup_jax.physics.mjx import CPU_COMPILER_OPTIONS, MjxState
-from getup_jax.types import Kinematics, PhysicsState
 
 CONFIG = PhysicsConfig(engine="mjx", solver="newton", gain_scale=1.5)
 NATIVE = dataclasses.replace(CONFIG, engine="native")

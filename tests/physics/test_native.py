@@ -12,11 +12,11 @@ from mujoco.batch import Batch
 from poses import lying, random_targets
 
 from getup_jax.config import PhysicsConfig
+from getup_jax.core.types import PhysicsState, select, take
+from getup_jax.envs.getup import rewards
 from getup_jax.physics.character import load_character
 from getup_jax.physics.engine import make_engine
 from getup_jax.physics.native import NativeEngine
-from getup_jax.tasks import rewards
-from getup_jax.types import PhysicsState, select, take
 
 CONFIG = PhysicsConfig(engine="native")
 INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION

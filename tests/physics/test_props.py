@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from getup_jax.config import ConfigError, PhysicsConfig
+from getup_jax.core.types import PropCommand
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.native import NativeEngine
 from getup_jax.physics.props import Ball, Equipment
-from getup_jax.types import PropCommand
 
 CONFIG = PhysicsConfig(
     engine="native", character="humanoid28", substeps=4, gain_scale=1, armature=0.02, damping=0

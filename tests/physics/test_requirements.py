@@ -5,7 +5,7 @@ import re
 import pytest
 
 from getup_jax.config import ConfigError, PhysicsConfig
-from getup_jax.paths import asset_path
+from getup_jax.core.resources import asset_path
 from getup_jax.physics.character import load_character
 from getup_jax.physics.requirements import GEOMS, LINKS
 

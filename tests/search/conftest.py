@@ -4,8 +4,8 @@ import pytest
 from tiny_task import tiny_task
 
 from getup_jax.config import PhysicsConfig
+from getup_jax.envs.getup.build import BuiltTask
 from getup_jax.physics.character import load_character
-from getup_jax.tasks.build import BuiltTask
 
 
 @pytest.fixture(scope="session")

@@ -6,12 +6,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from getup_jax import cli
+from getup_jax.cli import main
+from getup_jax.cli.search import search_config
 from getup_jax.config import Config, ConfigError, TerrainConfig
-from getup_jax.search.command import search_config
-from getup_jax.search.finder import Finder
-from getup_jax.search.sampling import Settings
-from getup_jax.tasks.build import BuiltTask
+from getup_jax.envs.getup.build import BuiltTask
+from getup_jax.trajectory_search.finder import Finder
+from getup_jax.trajectory_search.sampling import Settings
 
 SETTINGS = Settings(steps=3, spread_rad=0.2, pose=0.0, memory=0.9)
 
@@ -69,5 +69,5 @@ def test_the_search_uses_lying_starts_on_flat_ground():
     ],
 )
 def test_options_that_cannot_be_are_refused(option, expected, capsys, tmp_path):
-    assert cli.search_main(["flat", "--out", str(tmp_path), *option]) == 2
+    assert main.search_main(["flat", "--out", str(tmp_path), *option]) == 2
     assert expected in capsys.readouterr().err

@@ -7,13 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from getup_jax.algo.learner import make_learner
 from getup_jax.config import NetworkConfig, PPOConfig
-from getup_jax.control_gain import edit_plan
-from getup_jax.motion.align import FEATURE_SCALE
-from getup_jax.search import follow
-from getup_jax.search.follow import PARENTS, WINDOW, Follower, Search, Steps, bound
-from getup_jax.tasks.drawn_curves import Curve, style_curve
+from getup_jax.envs.getup.drawn_curves import Curve, style_curve
+from getup_jax.evaluation.control_gain import edit_plan
+from getup_jax.motion.getup.curve_alignment import FEATURE_SCALE
+from getup_jax.rl.learner import make_learner
+from getup_jax.trajectory_search import follow
+from getup_jax.trajectory_search.follow import PARENTS, WINDOW, Follower, Search, Steps, bound
 
 
 @pytest.fixture(autouse=True)

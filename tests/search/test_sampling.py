@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from getup_jax.search.finder import _ancestors
-from getup_jax.search.sampling import MOST_CHILDREN, Sampler, distance
+from getup_jax.trajectory_search.finder import _ancestors
+from getup_jax.trajectory_search.sampling import MOST_CHILDREN, Sampler, distance
 
 
 def test_distance_does_not_see_place_and_heading():

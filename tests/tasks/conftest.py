@@ -5,10 +5,10 @@ from ground_samples import make_site
 from tiny_task import tiny_task
 
 from getup_jax.config import PhysicsConfig
+from getup_jax.envs.getup.build import BuiltTask
+from getup_jax.envs.getup.resets.region_pool import Site
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.native import NativeEngine
-from getup_jax.tasks.build import BuiltTask
-from getup_jax.tasks.region_pool import Site
 
 PHYSICS = PhysicsConfig(engine="native")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.types import Kinematics
+from getup_jax.core.types import Kinematics
 
 LINKS = ("pelvis", "hand_l", "hand_r", "forearm_r", "foot_l")
 

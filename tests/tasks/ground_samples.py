@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 
 from getup_jax.config import TerrainConfig
+from getup_jax.envs.getup.resets.region_pool import Site
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.terrain_map import make_terrain
-from getup_jax.tasks.region_pool import Site
 
 TERRAIN = TerrainConfig(region_size_m=16.0, slope_block_m=8.0, drops=45)
 

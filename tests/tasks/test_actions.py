@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from tiny_task import CONFIG, LATENT, untrained_prior
 
-from getup_jax.tasks.actions import Units
-from getup_jax.tasks.rewards import natural
+from getup_jax.envs.getup.action_decoder import Units
+from getup_jax.envs.getup.rewards import natural
 
 SCALE = 0.25
 LIMIT = CONFIG.task.offset_limit_rad

@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 from tiny_task import CONFIG, tiny_task
 
 from getup_jax.config import ConfigError, TaskConfig
-from getup_jax.motion.features import FeatureLinks, features
-from getup_jax.tasks import assist, focus
-from getup_jax.tasks.draws import draw_starts, whole_episodes
-from getup_jax.tasks.episode import CLIP, LYING, STANDING
-from getup_jax.types import Kinematics
+from getup_jax.core.types import Kinematics
+from getup_jax.envs.getup.curriculum import assistive_wrench, start_prioritisation
+from getup_jax.envs.getup.curriculum.start_sampler import draw_starts, whole_episodes
+from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
+from getup_jax.motion.getup.features import FeatureLinks, features
 
 MOST = 300.0  # N
 
@@ -48,7 +48,7 @@ def hand(
     target = value + jnp.asarray(change)
     links, ground = FeatureLinks.of(character), jnp.asarray([normal])
     most = jnp.asarray([MOST])
-    return np.asarray(assist.wrench(links, kinematics, value, target, ground, most))[0]
+    return np.asarray(assistive_wrench.wrench(links, kinematics, value, target, ground, most))[0]
 
 
 def test_it_lifts_below_the_curve_and_never_pushes_down(character):
@@ -117,7 +117,7 @@ def test_levels_fall_with_success_rise_with_failure_and_stay_in_range():
     cell = (jnp.asarray([0, 1, 1, 2, 3]),)
     ended = jnp.asarray([True, True, True, False, True])
     success = jnp.asarray([False, True, True, True, True])
-    after = np.asarray(assist.update(level, cell, ended, success, (0.03, 0.01)))
+    after = np.asarray(assistive_wrench.update(level, cell, ended, success, (0.03, 0.01)))
     np.testing.assert_allclose(after, [1.0, 0.44, 0.5, 0.0], atol=1e-6)
 
 
@@ -228,7 +228,7 @@ def test_the_hand_lets_go_after_some_time_and_its_level_moves():
 def test_what_an_episode_starts_from_is_drawn_independently(helped):
     # one key used twice would give the hand, or the short episodes, to some of the styles only
     task = dataclasses.replace(helped.environment.config, short_share=0.5)
-    learned = focus.first(helped.world.pool)
+    learned = start_prioritisation.first(helped.world.pool)
     drawn = draw_starts(task, helped.world, jax.random.PRNGKey(1), 8000, learned, None)
     lying = np.asarray(drawn.kind) != STANDING
     parts = {
@@ -247,7 +247,7 @@ def test_what_an_episode_starts_from_is_drawn_independently(helped):
 def test_starts_with_the_hand_have_a_frontier_of_their_own(helped):
     task = dataclasses.replace(helped.environment.config, focus=0.999)
     # alone the first style rises from lying, with the hand the second one does
-    learned = focus.first(helped.world.pool).at[CLIP].set(1.0).at[LYING, 0].set(1.0)
+    learned = start_prioritisation.first(helped.world.pool).at[CLIP].set(1.0).at[LYING, 0].set(1.0)
     levels = jnp.ones_like(learned).at[CLIP].set(0.0).at[LYING, 1].set(0.0)
     drawn = draw_starts(task, helped.world, jax.random.PRNGKey(2), 4000, learned, None, levels)
     lying, hand = np.asarray(drawn.kind) == LYING, np.asarray(drawn.helped)

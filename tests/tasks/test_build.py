@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from getup_jax.config import ConfigError
-from getup_jax.settings import load_config
-from getup_jax.tasks.build import build_task
+from getup_jax.config.load import load_config
+from getup_jax.envs.getup.build import build_task
 
 
 def test_a_prior_without_poses_is_an_error_that_names_the_setting():

@@ -11,17 +11,13 @@ from scipy.spatial.transform import Rotation
 from tiny_composite import CONFIG, clips, tiny_composite
 
 from getup_jax.config import ConfigError
+from getup_jax.core.types import StepOutput
+from getup_jax.envs.composite.build import action_centre, action_scale, assemble_composite
+from getup_jax.envs.composite.link_frames import FRAMES, LINK_STATE, observe
+from getup_jax.envs.composite.reference_state_init import resampled
+from getup_jax.envs.composite.reference_windows import window_at
+from getup_jax.envs.getup.curriculum import cuts
 from getup_jax.physics.character import load_character
-from getup_jax.tasks import cuts
-from getup_jax.tasks.build_composite import (
-    action_centre,
-    action_scale,
-    assemble_composite,
-)
-from getup_jax.tasks.clip_starts import resampled
-from getup_jax.tasks.link_frames import FRAMES, LINK_STATE, observe
-from getup_jax.tasks.reference_windows import window_at
-from getup_jax.types import StepOutput
 
 SIZE = 16
 

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from getup_jax.config import TerrainConfig
-from getup_jax.tasks.curriculum import Curriculum, advance, by_region, draw_region, first
+from getup_jax.envs.getup.curriculum.regions import (
+    Curriculum,
+    advance,
+    by_region,
+    draw_region,
+    first,
+)
 
 CONFIG = TerrainConfig(unlock_successes=3)
 

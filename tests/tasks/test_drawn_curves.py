@@ -12,9 +12,8 @@ import pytest
 from tiny_task import CONFIG, tiny_task
 
 from getup_jax.config import ConfigError, TaskConfig
-from getup_jax.motion import curves
-from getup_jax.motion.curves import NUM_POINTS
-from getup_jax.tasks.drawn_curves import (
+from getup_jax.envs.getup.curriculum.start_sampler import draw_starts, whole_episodes, with_curves
+from getup_jax.envs.getup.drawn_curves import (
     NOISE_RMS,
     Curve,
     covered_height,
@@ -24,8 +23,9 @@ from getup_jax.tasks.drawn_curves import (
     smooth_noise,
     style_curve,
 )
-from getup_jax.tasks.draws import draw_starts, whole_episodes, with_curves
-from getup_jax.tasks.episode import CLIP, LYING, STANDING
+from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
+from getup_jax.motion.getup import curves
+from getup_jax.motion.getup.curves import NUM_POINTS
 
 B = 6000
 SUPINE, LATE, PRONE, SIDE, OTHER_SIDE = range(5)

@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from tiny_task import CONFIG, tiny_task
 
-from getup_jax.algo.learner import make_learner
 from getup_jax.config import NetworkConfig, PPOConfig
-from getup_jax.nets.mlp import OUTPUT_LAYER
+from getup_jax.networks.mlp import OUTPUT_LAYER
+from getup_jax.rl.learner import make_learner
 
 
 def test_a_policys_first_actions_are_the_same_on_native_and_mjx(character, built):

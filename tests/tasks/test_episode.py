@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from getup_jax.tasks.episode import (
+from getup_jax.envs.getup.episode import (
     CLIP,
     LYING,
     STANDING,

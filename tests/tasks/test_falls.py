@@ -5,23 +5,23 @@ import numpy as np
 import pytest
 from ground_samples import deepest_contact, lowest_centre
 
-from getup_jax.nets.prior_data import pose_conditions
+from getup_jax.envs.getup.resets import rag_doll
+from getup_jax.envs.getup.resets.lying import Starts
+from getup_jax.envs.getup.resets.rag_doll import DROPS, evenly
 from getup_jax.physics.plane import Plane
-from getup_jax.tasks import falls
-from getup_jax.tasks.falls import DROPS, evenly
-from getup_jax.tasks.lying import Starts
+from getup_jax.pose_prior.data import pose_conditions
 
 
 def fall(site, count: int, seed: int) -> Starts:
     """Limp bodies in the irregular regions."""
     rng = np.random.default_rng(seed)
     wanted = evenly(count)
-    return falls.fall(site.character, site.ground, wanted, DROPS["limp"], rng, lambda text: None)
+    return rag_doll.fall(site.character, site.ground, wanted, DROPS["limp"], rng, lambda text: None)
 
 
 def on_the_plane(character, count: int, drop: str) -> Starts:
     rng = np.random.default_rng(0)
-    return falls.fall(character, Plane(), np.array([count]), DROPS[drop], rng, lambda text: None)
+    return rag_doll.fall(character, Plane(), np.array([count]), DROPS[drop], rng, lambda text: None)
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from tiny_task import LATENT, untrained_prior
 
-from getup_jax.motion import curves
-from getup_jax.nets import prior as pose_prior
-from getup_jax.tasks.drawn_curves import style_curve
-from getup_jax.tasks.episode import CLIP, LYING, STANDING, EpisodeState
+from getup_jax.envs.getup.drawn_curves import style_curve
+from getup_jax.envs.getup.episode import CLIP, LYING, STANDING, EpisodeState
+from getup_jax.motion.getup import curves
+from getup_jax.pose_prior import prior as pose_prior
 
 B = 4
 CLIP_STYLE, CURVE_STYLE = 0, 1

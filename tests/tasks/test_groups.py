@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from tiny_composite import COMPOSITE, CONFIG, GROUPS
 
 from getup_jax.config import ConfigError, GroupConfig
+from getup_jax.envs.composite.groups import objective_weights, resolve_groups
 from getup_jax.physics.character import load_character
-from getup_jax.tasks.groups import objective_weights, resolve_groups
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,11 @@ import pytest
 from ground_samples import deepest_contact
 
 from getup_jax.config import ConfigError
-from getup_jax.nets.prior_data import pose_conditions
+from getup_jax.envs.getup.resets import knock_downs, lying
+from getup_jax.envs.getup.resets.knock_downs import knock_down
+from getup_jax.envs.getup.resets.standing import stand
 from getup_jax.physics.plane import Plane
-from getup_jax.tasks import knock_downs, lying
-from getup_jax.tasks.knock_downs import knock_down
-from getup_jax.tasks.stances import stand
+from getup_jax.pose_prior.data import pose_conditions
 
 
 def silent(text: str) -> None:

@@ -7,11 +7,11 @@ import pytest
 from tiny_task import CONFIG
 
 from getup_jax.config import ConfigError, TaskConfig
+from getup_jax.envs.getup.resets import lying_bodies
+from getup_jax.envs.getup.resets.lying import Starts
+from getup_jax.envs.getup.resets.lying_bodies import LimpBodies
+from getup_jax.envs.getup.resets.rag_doll import DROPS
 from getup_jax.physics.plane import Plane
-from getup_jax.tasks import limp
-from getup_jax.tasks.falls import DROPS
-from getup_jax.tasks.limp import LimpBodies
-from getup_jax.tasks.lying import Starts
 
 
 @pytest.fixture
@@ -32,9 +32,9 @@ def made(monkeypatch, tmp_path):
         calls.append((list(wanted), None, rng.integers(1 << 30)))
         return starts(character, wanted)
 
-    monkeypatch.setattr(limp, "fall", fall)
-    monkeypatch.setattr(limp, "knock_down", knock_down)
-    monkeypatch.setattr(limp, "cache_dir", lambda: tmp_path)
+    monkeypatch.setattr(lying_bodies, "fall", fall)
+    monkeypatch.setattr(lying_bodies, "knock_down", knock_down)
+    monkeypatch.setattr(lying_bodies, "cache_dir", lambda: tmp_path)
     return calls
 
 

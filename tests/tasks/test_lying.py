@@ -5,10 +5,16 @@ import numpy as np
 import pytest
 
 from getup_jax.config import ConfigError
+from getup_jax.envs.getup.resets import lying
+from getup_jax.envs.getup.resets.lying import (
+    DAMPING,
+    Starts,
+    falling_model,
+    is_on_ground,
+    until_enough,
+)
+from getup_jax.envs.getup.resets.rag_doll import DROPS, evenly, fall
 from getup_jax.physics.surface import lift, link_gaps
-from getup_jax.tasks import lying
-from getup_jax.tasks.falls import DROPS, evenly, fall
-from getup_jax.tasks.lying import DAMPING, Starts, falling_model, is_on_ground, until_enough
 
 
 def test_a_body_that_floats_or_sinks_is_not_on_the_ground(site):

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from tiny_task import getups, supine
 
-from getup_jax.tasks.matching import fits, least_used
+from getup_jax.envs.getup.resets.style_matching import fits, least_used
 
 
 def test_a_body_fits_the_styles_whose_first_torso_angles_are_near(character):

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from getup_jax import rotation
+from getup_jax.core import quaternion
+from getup_jax.core.types import Kinematics
+from getup_jax.envs.getup.observation import Observer
 from getup_jax.physics.terrain import Terrain
-from getup_jax.tasks.observation import Observer
-from getup_jax.types import Kinematics
 
 FLAT = Terrain.flat()
 BLOCKS = {
@@ -154,7 +154,7 @@ def test_joint_rotations_rebuild_the_link_rotations(observer, engine, character)
     assert (np.asarray(joint[..., 0]) >= 0).all()
     rebuilt = [link[:, 0]]
     for index, parent in enumerate(observer.parents):
-        rebuilt.append(rotation.multiply(rebuilt[parent], joint[:, index]))
+        rebuilt.append(quaternion.multiply(rebuilt[parent], joint[:, index]))
     same = np.abs(np.sum(np.stack(rebuilt, axis=1) * np.asarray(link), axis=-1))
     np.testing.assert_allclose(same, 1.0, atol=1e-5)  # up to sign
 

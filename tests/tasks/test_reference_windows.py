@@ -11,11 +11,8 @@ from scipy.spatial.transform import Rotation, Slerp
 from tiny_composite import COMPOSITE, CONFIG, squat, wave
 
 from getup_jax.config import ConfigError
-from getup_jax.motion.clips import Clip
-from getup_jax.motion.loops import repeated
-from getup_jax.physics.character import load_character
-from getup_jax.tasks.groups import resolve_groups
-from getup_jax.tasks.reference_windows import (
+from getup_jax.envs.composite.groups import resolve_groups
+from getup_jax.envs.composite.reference_windows import (
     link_poses,
     make_references,
     nearest,
@@ -23,6 +20,9 @@ from getup_jax.tasks.reference_windows import (
     travel,
     window_at,
 )
+from getup_jax.motion.authoring.loops import repeated
+from getup_jax.motion.clips import Clip
+from getup_jax.physics.character import load_character
 
 DT = 1.0 / 30.0
 

@@ -10,13 +10,16 @@ from ground_samples import TERRAIN, deepest_contact
 from tiny_task import CONFIG, getups, neutral_prior
 
 from getup_jax.config import ConfigError
-from getup_jax.nets.prior_data import pose_conditions
+from getup_jax.envs.getup import terminations
+from getup_jax.envs.getup.build import assemble
+from getup_jax.envs.getup.curriculum import sampler_update, start_prioritisation, start_sampler
+from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
+from getup_jax.envs.getup.resets import lying_bodies as limp
+from getup_jax.envs.getup.resets import misfit, region_pool
 from getup_jax.physics.character import load_character
 from getup_jax.physics.native import NativeEngine
 from getup_jax.physics.surface import link_gaps
-from getup_jax.tasks import draws, early_ends, focus, limp, misfit, practice, region_pool
-from getup_jax.tasks.build import assemble
-from getup_jax.tasks.episode import CLIP, LYING, STANDING
+from getup_jax.pose_prior.data import pose_conditions
 
 TASK = dataclasses.replace(CONFIG.task, stand_start=0.3, clip_start=0.2, pool_size=120)
 ROWS = 5  # 120 over three kinds, four regions and two styles
@@ -109,7 +112,7 @@ def test_every_region_has_starts_along_the_clip_if_asked(character, site, cache)
         np.testing.assert_allclose(qpos[:, 7:], flat[:, 7:], atol=1e-6)
     state = built.environment.init(built.world, jax.random.PRNGKey(0), 512)
     state = state.curriculum.replace(opened=jnp.asarray(4, jnp.int32))
-    kind, region = draws._places(task, jax.random.PRNGKey(0), 2000, state)
+    kind, region = start_sampler._places(task, jax.random.PRNGKey(0), 2000, state)
     share = np.asarray(kind == CLIP)[np.asarray(region) > 0].mean()
     assert share == pytest.approx(task.clip_start, abs=0.04)
 
@@ -187,13 +190,13 @@ def test_lying_starts_of_another_misfit_are_of_another_cell(character, cache):
     rows = jnp.arange(count, dtype=jnp.int32)
     zero = jnp.zeros(count, jnp.int32)
     state = built.environment.start(built.world, zero, zero + LYING, rows, region=zero + 3)
-    place, _, part = practice.first_cell(pool, state, built.environment.engine.control_dt)
+    place, _, part = sampler_update.first_cell(pool, state, built.environment.engine.control_dt)
     np.testing.assert_array_equal(part, cells)
     np.testing.assert_array_equal(place, LYING * regions + 3)
     # the class of the first row is solved, the others are not: they are drawn instead
-    learned = focus.first(pool).at[LYING * regions + 3, 0, cells[0]].set(1.0)
+    learned = start_prioritisation.first(pool).at[LYING * regions + 3, 0, cells[0]].set(1.0)
     learned = learned.at[CLIP * regions].set(1.0)
-    weight = np.asarray(focus.weights(learned, pool, built.world.duration, 0.5))
+    weight = np.asarray(start_prioritisation.weights(learned, pool, built.world.duration, 0.5))
     expected = np.where(cells == cells[0], 0.5, 1.0)
     np.testing.assert_allclose(weight[LYING * regions + 3, 0], expected, atol=1e-6)
     assert len(np.unique(cells)) > 1
@@ -237,7 +240,7 @@ def test_the_head_is_on_the_floor_where_it_touches_the_slope(uneven, site):
     state = at(uneven, LYING, 3)
     link = site.character.head_sphere[0]
     kinematics = state.physics.kinematics
-    gap = np.asarray(early_ends.head_gap(env.character, uneven.world.terrain, kinematics))
+    gap = np.asarray(terminations.head_gap(env.character, uneven.world.terrain, kinematics))
     qpos = np.asarray(kinematics.qpos)
     np.testing.assert_allclose(gap, link_gaps(site.character, field, qpos)[:, link], atol=1e-4)
 

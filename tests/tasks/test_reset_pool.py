@@ -9,16 +9,22 @@ from scipy.spatial.transform import Rotation
 from tiny_task import CONFIG, LATENT, getups, supine
 
 from getup_jax.config import ConfigError
-from getup_jax.motion import curves
-from getup_jax.motion.align import FEATURE_SCALE
+from getup_jax.core.resources import asset_path
+from getup_jax.envs.getup.build import say_which_lie
+from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
+from getup_jax.envs.getup.resets.archived_states import (
+    SHIPPED,
+    FoundPath,
+    load_path,
+    load_paths,
+    save_path,
+)
+from getup_jax.envs.getup.resets.lying import Starts
+from getup_jax.envs.getup.resets.pool import FlatStarts, angle_gap, build_pool, kind_shares
 from getup_jax.motion.clips import GetUp
-from getup_jax.nets.prior_data import pose_conditions
-from getup_jax.paths import asset_path
-from getup_jax.tasks.build import say_which_lie
-from getup_jax.tasks.episode import CLIP, LYING, STANDING
-from getup_jax.tasks.lying import Starts
-from getup_jax.tasks.paths import SHIPPED, FoundPath, load_path, load_paths, save_path
-from getup_jax.tasks.reset_pool import FlatStarts, angle_gap, build_pool, kind_shares
+from getup_jax.motion.getup import curves
+from getup_jax.motion.getup.curve_alignment import FEATURE_SCALE
+from getup_jax.pose_prior.data import pose_conditions
 
 ACTION = LATENT + 49
 TASK = dataclasses.replace(CONFIG.task, stand_start=0.2, clip_start=0.3, pool_size=60)

@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from getup_jax.motion import curves
-from getup_jax.tasks import rewards
+from getup_jax.envs.getup import rewards
+from getup_jax.motion.getup import curves
 
 RNG = np.random.default_rng(0)
 N = 40

@@ -6,7 +6,7 @@ from ground_samples import deepest_contact, make_site
 from scipy.spatial.transform import Rotation
 from tiny_task import CONFIG
 
-from getup_jax.tasks.set_down import set_down, to_normal
+from getup_jax.envs.getup.resets.terrain_projection import set_down, to_normal
 
 UP = np.array([[0.0, 0.0, 1.0]])
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from ground_samples import deepest_contact
 
-from getup_jax.tasks.stances import SIDES, soles_touch, stand
+from getup_jax.envs.getup.resets.standing import SIDES, soles_touch, stand
 
 
 @pytest.fixture(scope="module")

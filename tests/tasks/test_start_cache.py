@@ -6,8 +6,8 @@ import numpy as np
 from ground_samples import TERRAIN, make_site
 
 from getup_jax.config import PhysicsConfig
-from getup_jax.tasks.lying import Starts
-from getup_jax.tasks.start_cache import Request, cached_starts, fingerprint
+from getup_jax.envs.getup.resets.cache import Request, cached_starts, fingerprint
+from getup_jax.envs.getup.resets.lying import Starts
 
 REQUEST = Request("falls", 2, 0)
 

@@ -11,8 +11,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from tiny_task import CONFIG, getups
 
-from getup_jax.algo.learner import make_learner
-from getup_jax.algo.objectives import make_objectives
 from getup_jax.config import (
     CompositeConfig,
     ConfigError,
@@ -21,9 +19,11 @@ from getup_jax.config import (
     NetworkConfig,
     PPOConfig,
 )
-from getup_jax.tasks.build import assemble
-from getup_jax.tasks.reference_windows import travel
-from getup_jax.tasks.styled import with_objectives
+from getup_jax.envs.composite.discriminator_rewards import make_objectives
+from getup_jax.envs.composite.reference_windows import travel
+from getup_jax.envs.getup.build import assemble
+from getup_jax.envs.getup.styled import with_objectives
+from getup_jax.rl.learner import make_learner
 
 SIZE = 6
 STYLE = CompositeConfig(

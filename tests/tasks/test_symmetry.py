@@ -9,19 +9,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tiny_task import CONFIG, LATENT, getups, untrained_prior
 
-from getup_jax import mirror
-from getup_jax.algo.learner import Learner, make_learner
-from getup_jax.checkpoint import CHECKPOINTS, load_policy, restore_learner, save_learner
 from getup_jax.config import CompositeConfig, GroupConfig, NetworkConfig, PhysicsConfig
-from getup_jax.mirror import AXIAL, POLAR, Symmetry, concatenated, signed
-from getup_jax.nets.prior import from_dict, to_dict
+from getup_jax.core import mirror
+from getup_jax.core.mirror import AXIAL, POLAR, Symmetry, concatenated, signed
+from getup_jax.envs.getup.build import BuiltTask, assemble
+from getup_jax.envs.getup.observation import Observer
+from getup_jax.envs.getup.symmetry import action_mirror, find_symmetry, observation_mirror
 from getup_jax.physics.character import CharacterSpec, load_character
 from getup_jax.physics.mirror_image import joint_mirror
 from getup_jax.physics.native import NativeEngine
-from getup_jax.storage import from_nested
-from getup_jax.tasks.build import BuiltTask, assemble
-from getup_jax.tasks.observation import Observer
-from getup_jax.tasks.symmetry import action_mirror, find_symmetry, observation_mirror
+from getup_jax.pose_prior.prior import from_dict, to_dict
+from getup_jax.rl.learner import Learner, make_learner
+from getup_jax.runtime.checkpoint import CHECKPOINTS, load_policy, restore_learner, save_learner
+from getup_jax.runtime.pytree_store import from_nested
 
 STEPS = 30
 NETWORK = NetworkConfig(hidden_sizes=(32,))

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from tiny_task import CONFIG, tiny_task
 
-from getup_jax import train
 from getup_jax.config import CompositeConfig, Config, ConfigError, NetworkConfig, PPOConfig
-from getup_jax.tasks.build import BuiltTask
-from getup_jax.tasks.draws import whole_episodes
-from getup_jax.tasks.episode import LYING
+from getup_jax.envs.getup.build import BuiltTask
+from getup_jax.envs.getup.curriculum.start_sampler import whole_episodes
+from getup_jax.envs.getup.episode import LYING
+from getup_jax.training import run
 
 PPO = PPOConfig(num_envs=8, num_steps=3, epochs=1, minibatch_size=24, popart=True)
 SHARP = dataclasses.replace(CONFIG.task, sharpness=1.5, track_weight=0.5, track_sharpness=3.0)
@@ -69,8 +69,8 @@ def test_a_grace_time_pays_no_objective(character):
 
 
 def test_the_learner_has_a_critic_each_with_the_weights_that_are_set(sharp, monkeypatch):
-    monkeypatch.setattr(train, "build_task", lambda config, log: sharp)
-    job = train.build_job(with_task(SHARP), lambda text: None)
+    monkeypatch.setattr(run, "build_task", lambda config, log: sharp)
+    job = run.build_job(with_task(SHARP), lambda text: None)
     np.testing.assert_allclose(job.learner.weights, (2 / 3, 1 / 3))
     state = job.learner.init(job.world, jax.random.PRNGKey(0))
     value = job.learner.value(state.learner, state.environment.observation)

@@ -14,9 +14,9 @@ from getup_jax.config import (
     PPOConfig,
     TaskConfig,
 )
+from getup_jax.envs.composite.build import BuiltComposite, assemble_composite
 from getup_jax.motion.clips import Clip
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.tasks.build_composite import BuiltComposite, assemble_composite
 
 GROUPS = {
     "upper": GroupConfig(links=("upper",), frame="root", speed=(0.8, 1.2)),

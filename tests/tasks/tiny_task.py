@@ -8,15 +8,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from getup_jax.config import Config, PhysicsConfig, TaskConfig
+from getup_jax.envs.getup.build import BuiltTask, assemble
 from getup_jax.motion.clips import Clip, GetUp
-from getup_jax.motion.curves import NUM_POINTS
-from getup_jax.nets.cvae import CVAE, init_variables
-from getup_jax.nets.mlp import OUTPUT_LAYER
-from getup_jax.nets.prior import PosePrior
-from getup_jax.nets.prior_data import pose_conditions
+from getup_jax.motion.getup.curves import NUM_POINTS
+from getup_jax.networks.mlp import OUTPUT_LAYER
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.mirror_image import joint_mirror
-from getup_jax.tasks.build import BuiltTask, assemble
+from getup_jax.pose_prior.cvae import CVAE, init_variables
+from getup_jax.pose_prior.data import pose_conditions
+from getup_jax.pose_prior.prior import PosePrior
 
 LATENT = 16
 CLIP_SECONDS = 1.0

@@ -3,7 +3,7 @@
 Every number has its range beside its default (`ranges.number`), and all are checked before
 anything is built; relations between settings are in `__post_init__`. Sub-configs that are None
 are switched off, and the switch is decided when the step is traced. `load_config` is in
-`settings.py`.
+`config/load.py`.
 """
 
 from __future__ import annotations

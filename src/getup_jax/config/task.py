@@ -65,7 +65,7 @@ class TaskConfig:
     focus: float = number(0.0, least=0, below=1)
     focus_even: bool = False  # as often for a style with one part at the frontier as with ten
     # share of the training episodes whose curves are drawn: blends of styles that start alike,
-    # their control points moved by smooth noise, over other durations; see tasks/drawn_curves.py
+    # their control points moved by smooth noise, over other durations; see drawn_curves.py
     drawn_share: float = number(0.0, least=0, most=1)
     # of drawn curves; 1: rms of .08 m, 10 degrees (side), 12 (front)
     curve_noise: float = number(1.0, least=0, most=10)
@@ -78,7 +78,7 @@ class TaskConfig:
     # share of the lying starts on flat ground that are limp bodies, not the motions' own poses; on
     # irregular ground all of them are
     limp_share: float = number(0.0, least=0, most=1)
-    drop_as: str = "limp"  # how these are dropped: limp | any | paper, see DROPS in tasks/falls.py
+    drop_as: str = "limp"  # how these are dropped: limp | any | paper, see DROPS in rag_doll.py
     # how many on flat ground; terrain.drops on irregular ground
     limp_drops: int = number(1000, least=1, most=1_000_000)
     # share of them that stood, were pushed and fell

@@ -10,8 +10,8 @@ from getup_jax.editor.export import export
 from getup_jax.editor.imports import curves_of
 from getup_jax.editor.messages import Request
 from getup_jax.editor.session import Session
-from getup_jax.motion.apart import Stop
-from getup_jax.motion.curve_file import dump, parse_text
+from getup_jax.motion.io.curve_file import dump, parse_text
+from getup_jax.motion.retarget.subprocess_job import Stop
 
 
 def answer(request: Request, session: Session, stop: Stop) -> str | bytes:

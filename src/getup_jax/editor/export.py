@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from getup_jax import video
 from getup_jax.editor.simulate import Motion
-from getup_jax.motion.apart import Stop
-from getup_jax.motion.bvh_writer import write_bvh
-from getup_jax.motion.curve_file import dump
-from getup_jax.motion.features import NAMES
-from getup_jax.motion.retarget import RetargetReport
-from getup_jax.motion.skeleton import Recording
+from getup_jax.evaluation import film
+from getup_jax.motion.getup.features import NAMES
+from getup_jax.motion.io.bvh_writer import write_bvh
+from getup_jax.motion.io.curve_file import dump
+from getup_jax.motion.io.recording import Recording
+from getup_jax.motion.retarget.retarget import RetargetReport
+from getup_jax.motion.retarget.subprocess_job import Stop
 from getup_jax.physics.character import CharacterSpec
 
 FORMATS = ("bvh", "npz", "csv", "mp4")
@@ -139,8 +139,8 @@ def _ends(character: CharacterSpec) -> dict[int, np.ndarray]:
 
 
 def _film(motion: Motion, character: CharacterSpec, path: Path, stop: Stop) -> None:
-    imageio = video.require()
-    images = video.pictures(character.model, motion.frames.qpos)
+    imageio = film.require()
+    images = film.pictures(character.model, motion.frames.qpos)
     with warnings.catch_warnings():
         # starting ffmpeg is a fork and an exec in one, which is safe
         warnings.filterwarnings("ignore", message="os.fork", category=RuntimeWarning)
@@ -148,4 +148,4 @@ def _film(motion: Motion, character: CharacterSpec, path: Path, stop: Stop) -> N
         with imageio.get_writer(path, fps=fps, macro_block_size=8) as writer:
             for image in images:
                 stop.check()
-                writer.append_data(video.caption(image, motion.curve.name))
+                writer.append_data(film.caption(image, motion.curve.name))

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from getup_jax.editor.starts import reference_curve
-from getup_jax.motion.apart import Stop, run_apart
-from getup_jax.motion.cache import kept, read_npz
 from getup_jax.motion.clips import Clip, GetUp, MotionError
-from getup_jax.motion.curve_file import DURATION_S, CurveFile
-from getup_jax.motion.getups import find_getups
-from getup_jax.motion.guard import one_line
-from getup_jax.motion.job import Job
-from getup_jax.motion.readers import SUFFIXES, ReadOptions
-from getup_jax.motion.retarget import RetargetSettings
+from getup_jax.motion.getup.getups import find_getups
+from getup_jax.motion.io.curve_file import DURATION_S, CurveFile
+from getup_jax.motion.io.guard import one_line
+from getup_jax.motion.io.readers import SUFFIXES, ReadOptions
+from getup_jax.motion.retarget.cache import kept, read_npz
+from getup_jax.motion.retarget.job import Job
+from getup_jax.motion.retarget.retarget import RetargetSettings
+from getup_jax.motion.retarget.subprocess_job import Stop, run_apart
 from getup_jax.physics.character import CharacterSpec
 
 _MAX_UNPACKED_BYTES = 256_000_000  # of an npz file, which may be packed very tightly

@@ -19,7 +19,7 @@ import numpy as np
 from getup_jax.editor.export import FORMATS
 from getup_jax.editor.simulate import Frames, Motion
 from getup_jax.editor.starts import ANYWHERE, Place
-from getup_jax.motion.curve_file import CurveFile, parse
+from getup_jax.motion.io.curve_file import CurveFile, parse
 from getup_jax.physics.terrain_map import REGIONS
 
 MAX_TEXT_BYTES = 128_000

@@ -6,7 +6,7 @@ import argparse
 import ipaddress
 from collections.abc import Sequence
 
-from getup_jax.eval_options import add_checkpoint
+from getup_jax.evaluation.options import add_checkpoint
 
 PORT = 8421
 _TOKEN = 12  # characters at least

@@ -7,20 +7,20 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.config import ConfigError
+from getup_jax.core.resources import asset_path
 from getup_jax.editor.simulate import Simulator
 from getup_jax.editor.starts import lies, reference_curve
-from getup_jax.motion import curve_file
+from getup_jax.evaluation.film import require
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.curve_file import CurveFile, read_curve_file
+from getup_jax.motion.getup.plot import strategy_curves
+from getup_jax.motion.io import curve_file
+from getup_jax.motion.io.curve_file import CurveFile, read_curve_file
 from getup_jax.motion.library import AUTHORED
-from getup_jax.motion.plot import strategy_curves
-from getup_jax.paths import asset_path
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain import HeightField
 from getup_jax.physics.terrain_map import REGIONS
-from getup_jax.video import require
+from getup_jax.runtime.checkpoint import LoadedPolicy
 
 _PATCH_M = 6.0  # the ground is sent this far to each side of the start
 _SHAPES = {

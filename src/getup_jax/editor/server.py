@@ -20,8 +20,6 @@ from typing import Any
 from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
-from getup_jax import checkpoint
-from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.editor import messages
 from getup_jax.editor.outbox import Outbox
 from getup_jax.editor.scene import describe
@@ -29,6 +27,8 @@ from getup_jax.editor.session import Session, error_message
 from getup_jax.editor.simulate import Simulator
 from getup_jax.editor.site import Site
 from getup_jax.editor.work import Work
+from getup_jax.runtime import checkpoint
+from getup_jax.runtime.checkpoint import LoadedPolicy
 
 _MAX_BYTES = messages.MAX_FILE_BYTES + messages.MAX_TEXT_BYTES
 _MAX_PAGES = 16

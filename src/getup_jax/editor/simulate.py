@@ -12,23 +12,23 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from getup_jax.algo.state import PolicyState
-from getup_jax.checkpoint import LoadedPolicy
 from getup_jax.config import Config
 from getup_jax.editor.starts import ANYWHERE, Place, Starts
-from getup_jax.episodes import CHUNK, Roller, Trace
-from getup_jax.eval_options import eval_parser
-from getup_jax.evaluate import evaluation_config, restore_policy
+from getup_jax.envs.getup.build import BuiltTask, build_task
+from getup_jax.envs.getup.drawn_curves import Curve
+from getup_jax.envs.getup.episode import LYING
+from getup_jax.evaluation.getup import evaluation_config, restore_policy
+from getup_jax.evaluation.metrics import episode_values
+from getup_jax.evaluation.motion_quality import FootPoints
+from getup_jax.evaluation.options import eval_parser
+from getup_jax.evaluation.rollout import CHUNK, Roller, Trace
 from getup_jax.motion.clips import GetUp
-from getup_jax.motion.curve_file import CurveFile
-from getup_jax.naturalness import FootPoints
-from getup_jax.nets import prior as pose_prior
+from getup_jax.motion.io.curve_file import CurveFile
 from getup_jax.physics.body_digest import body_digest, warn_if_other
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.scores import episode_values
-from getup_jax.tasks.build import BuiltTask, build_task
-from getup_jax.tasks.drawn_curves import Curve
-from getup_jax.tasks.episode import LYING
+from getup_jax.pose_prior import prior as pose_prior
+from getup_jax.rl.state import PolicyState
+from getup_jax.runtime.checkpoint import LoadedPolicy
 
 _POOL = 416  # start states on irregular ground: eight places a region for thirteen starts
 

@@ -10,17 +10,17 @@ import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.config import TaskConfig
-from getup_jax.motion import events
+from getup_jax.core.types import take
+from getup_jax.envs.getup.build import BuiltTask
+from getup_jax.envs.getup.episode import LYING
+from getup_jax.envs.getup.resets.pool import FlatStarts, Pool, angle_gap, build_pool
 from getup_jax.motion.clips import Clip, GetUp, MotionError
-from getup_jax.motion.curve_file import LIMITS, CurveFile
-from getup_jax.motion.events import link_positions
-from getup_jax.motion.getups import clip_features
+from getup_jax.motion.getup import events
+from getup_jax.motion.getup.events import link_positions
+from getup_jax.motion.getup.getups import clip_features
+from getup_jax.motion.io.curve_file import LIMITS, CurveFile
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain_map import REGIONS
-from getup_jax.tasks.build import BuiltTask
-from getup_jax.tasks.episode import LYING
-from getup_jax.tasks.reset_pool import FlatStarts, Pool, angle_gap, build_pool
-from getup_jax.types import take
 
 _KEPT = 256  # start states kept, by what they start from
 

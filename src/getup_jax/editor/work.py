@@ -11,7 +11,7 @@ from getup_jax.editor.answers import answer
 from getup_jax.editor.messages import MessageError, Request
 from getup_jax.editor.outbox import Outbox
 from getup_jax.editor.session import Session, error_message
-from getup_jax.motion.apart import Stop
+from getup_jax.motion.retarget.subprocess_job import Stop
 
 SLOW = 2  # imports and exports at once, of all pages together
 _QUICK = 8  # requests of one page that are not answered yet

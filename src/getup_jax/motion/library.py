@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from getup_jax.config import MotionConfig
-from getup_jax.motion import curve_file
-from getup_jax.motion.cache import Job, read_npz, retarget_files
 from getup_jax.motion.clips import Clip, GetUp, MotionError
-from getup_jax.motion.getups import cut_getup, find_getups
-from getup_jax.motion.readers import ReadOptions, motion_files
-from getup_jax.motion.retarget import RetargetReport, RetargetSettings
+from getup_jax.motion.getup.getups import cut_getup, find_getups
+from getup_jax.motion.io import curve_file
+from getup_jax.motion.io.readers import ReadOptions, motion_files
+from getup_jax.motion.retarget.cache import Job, read_npz, retarget_files
+from getup_jax.motion.retarget.retarget import RetargetReport, RetargetSettings
 from getup_jax.physics.character import CharacterSpec
 
 AUTHORED, DEEPMIMIC = "authored", "deepmimic"
@@ -136,7 +136,7 @@ def cpus() -> int:
 def _authored(
     config: MotionConfig, character: CharacterSpec
 ) -> tuple[list[GetUp], list[np.ndarray]]:
-    from getup_jax.motion.keyframes import authored_poses, load_authored
+    from getup_jax.motion.authoring.keyframes import authored_poses, load_authored
 
     getups = load_authored(character)
     noise, count = config.augment_noise_rad, config.augment_poses

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from getup_jax.config import ConfigError
-from getup_jax.motion.cache import Job, read_npz, retarget_files
+from getup_jax.core.resources import asset_path
+from getup_jax.motion.authoring.keyframe_clip import clip_from_keyframes
+from getup_jax.motion.authoring.keyframe_file import read_keyframes
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.keyframe_clip import clip_from_keyframes
-from getup_jax.motion.keyframe_file import read_keyframes
-from getup_jax.motion.readers import ReadOptions
-from getup_jax.motion.retarget import RetargetSettings
-from getup_jax.paths import asset_path
+from getup_jax.motion.io.readers import ReadOptions
+from getup_jax.motion.retarget.cache import Job, read_npz, retarget_files
+from getup_jax.motion.retarget.retarget import RetargetSettings
 from getup_jax.physics.character import CharacterSpec
 
 

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from getup_jax.config import ConfigError, PhysicsConfig
-from getup_jax.paths import asset_path
+from getup_jax.core.resources import asset_path
 from getup_jax.physics.props import Equipment, add_balls, add_racket
 from getup_jax.physics.requirements import check_character, hinges_of
 from getup_jax.physics.terrain_map import TerrainMap

@@ -7,8 +7,8 @@ import importlib.util
 import jax
 
 from getup_jax.config import PhysicsConfig
+from getup_jax.core.types import Engine
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.types import Engine
 
 
 def make_engine(character: CharacterSpec, config: PhysicsConfig) -> Engine:

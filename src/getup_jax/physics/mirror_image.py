@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from getup_jax.mirror import AXIAL, POLAR, SignedPermutation, concatenated, signed
+from getup_jax.core.mirror import AXIAL, POLAR, SignedPermutation, concatenated, signed
 from getup_jax.physics.character import CharacterSpec
 
 _POSES = 4  # compared with their images

@@ -18,9 +18,9 @@ from flax import struct
 from mujoco import mjx
 
 from getup_jax.config import ConfigError, PhysicsConfig
+from getup_jax.core.types import Kinematics, PhysicsState, PropCommand
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.props import with_balls
-from getup_jax.types import Kinematics, PhysicsState, PropCommand
 
 
 @struct.dataclass

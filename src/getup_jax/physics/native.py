@@ -22,9 +22,9 @@ from jax.experimental.buffer_callback import buffer_callback
 from mujoco.batch import Batch, SimulationError
 
 from getup_jax.config import PhysicsConfig
+from getup_jax.core.types import Kinematics, PhysicsState, PropCommand
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.props import with_balls
-from getup_jax.types import Kinematics, PhysicsState, PropCommand
 
 _STAGE = mujoco.mjtStage.mjSTAGE_VEL.value
 _FAST_LIMIT = 1e4  # rad/s or m/s; a state past it has diverged

@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from getup_jax.core.types import Engine, PhysicsState, select
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.types import Engine, PhysicsState, select
 
 
 def push(

@@ -7,8 +7,8 @@ import pytest
 
 from getup_jax.config import CompositeConfig, ConfigError, GroupConfig, PhysicsConfig
 from getup_jax.config.ranges import range_of
+from getup_jax.envs.composite.goals.combine import GOALS, make_goals
 from getup_jax.physics.character import load_character
-from getup_jax.tasks.goals.combine import GOALS, make_goals
 
 GROUPS = {"body": GroupConfig(links=("full",), clips=("walk",))}
 SETTINGS = [

@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from getup_jax.tasks.goals import Marker
-from getup_jax.tasks.goals.drawing import add_markers
+from getup_jax.envs.composite.goals import Marker
+from getup_jax.envs.composite.goals.drawing import add_markers
 
 ARROW = Marker(np.array([1.0, 0.0, 0.5]), reach=np.array([0.0, 2.0, 0.0]), radius=0.02)
 SPHERE = Marker(np.array([0.0, 1.0, 0.0]), radius=0.3, rgba=(0.1, 0.2, 0.3, 0.4))

@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 
 from getup_jax.config import PhysicsConfig
+from getup_jax.envs.composite.goals import equipment_of, make_goals
+from getup_jax.envs.composite.goals.drawing import add_markers
+from getup_jax.envs.composite.goals.juggling import LEFT, NONE, RIGHT
 from getup_jax.physics.character import load_character
 from getup_jax.physics.native import NativeEngine
-from getup_jax.tasks.goals import equipment_of, make_goals
-from getup_jax.tasks.goals.drawing import add_markers
-from getup_jax.tasks.goals.juggling import LEFT, NONE, RIGHT
 
 CONFIG = PhysicsConfig(
     engine="native", character="humanoid28", substeps=4, gain_scale=1, armature=0.02, damping=0

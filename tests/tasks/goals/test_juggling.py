@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from goal_samples import LINKS, kinematics
 
-from getup_jax.tasks.goals.flight import GRAVITY
-from getup_jax.tasks.goals.juggling import LEFT, NONE, RIGHT, Juggling, JugglingState
+from getup_jax.envs.composite.goals.flight import GRAVITY
+from getup_jax.envs.composite.goals.juggling import LEFT, NONE, RIGHT, Juggling, JugglingState
 
 KEY = jax.random.key(0)
 GOAL = Juggling(1 / 30, left=LINKS.index("hand_l"), right=LINKS.index("hand_r"))

@@ -9,11 +9,11 @@ import pytest
 from goal_samples import LINKS, kinematics
 
 from getup_jax.config import ConfigError, PhysicsConfig
+from getup_jax.envs.composite.goals import Goals, make_goals
+from getup_jax.envs.composite.goals.aiming import Aiming, AimingState
+from getup_jax.envs.composite.goals.target_heading import HeadingState, TargetHeading
+from getup_jax.envs.composite.goals.target_location import LocationState, TargetLocation
 from getup_jax.physics.character import load_character
-from getup_jax.tasks.goals import Goals, make_goals
-from getup_jax.tasks.goals.aiming import Aiming, AimingState
-from getup_jax.tasks.goals.target_heading import HeadingState, TargetHeading
-from getup_jax.tasks.goals.target_location import LocationState, TargetLocation
 
 KEY = jax.random.key(0)
 DT = 1 / 30

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from goal_samples import LINKS, kinematics
 
-from getup_jax.tasks.goals.flight import GRAVITY, kick, landing, throw
-from getup_jax.tasks.goals.tennis_swing import TennisState, TennisSwing
+from getup_jax.envs.composite.goals.flight import GRAVITY, kick, landing, throw
+from getup_jax.envs.composite.goals.tennis_swing import TennisState, TennisSwing
 
 KEY = jax.random.key(0)
 DT = 1 / 30

@@ -1,0 +1,240 @@
+"""`getup-motion`: import, list and plot motions, and show the get-ups in a file."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from getup_jax.cli.motion_report import FileReport, event_table, file_table, getup_table, report_of
+from getup_jax.config import MotionConfig, PhysicsConfig
+from getup_jax.motion.clips import MotionError
+from getup_jax.motion.io.readers import ReadOptions, motion_files
+from getup_jax.motion.library import cpus, load_motions
+from getup_jax.motion.retarget.cache import Job, Result, read_npz, retarget_files, write_npz
+from getup_jax.motion.retarget.joint_names import read_map
+from getup_jax.motion.retarget.retarget import RetargetSettings
+from getup_jax.physics.character import CharacterSpec, load_character
+
+_EXAMPLES = """\
+examples:
+  getup-motion import mocap/ --out clips --json report.json
+                                   read every motion file of a folder, retarget it, keep clips
+  getup-motion import walk.bvh --names map.yaml --scale 0.01 --floor 0
+  getup-motion events clips/fall.npz       when it lies, rises and stands
+  getup-motion list authored clips/        get-ups that a config can train on
+  getup-motion plot clips/ --out curves.png
+  getup-motion plot authored --strategies --out strategies.png
+"""
+
+_EXIT = "exit code: 0 where every file was used, with warnings or without; 1 where one was not"
+_FASTEST_HZ = 10_000
+_SOURCE = "authored, deepmimic, a folder or a file"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a sub-command; 1 where a file failed, and MotionError where nothing can be done."""
+    args = _parser().parse_args(argv)
+    return args.run(args, load_character(PhysicsConfig(character=args.character)))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="getup-motion",
+        description="Motion files to clips on the character, and the get-ups in them.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    load = _command(commands, "import", _import, "read and retarget motion files")
+    load.add_argument("paths", nargs="+", type=Path, metavar="FILE|FOLDER")
+    load.add_argument("--out", type=Path, help="folder for the clips (.npz); none: only a check")
+    load.add_argument("--json", type=Path, help="write the report as JSON")
+    _add_reading(load)
+    show = _command(commands, "list", _list, "the get-ups of motion sources")
+    show.add_argument("sources", nargs="*", default=["authored"], metavar="SOURCE", help=_SOURCE)
+    plot = _command(commands, "plot", _plot, "draw the style curves of motion sources")
+    plot.add_argument("sources", nargs="+", metavar="SOURCE", help=_SOURCE)
+    plot.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture")
+    plot.add_argument("--curves", nargs="*", default=[], metavar="NAME", help="only these get-ups")
+    plot.add_argument(
+        "--strategies", action="store_true", help="only mean and deviation of each strategy"
+    )
+    events = _command(commands, "events", _events, "the get-ups in one file")
+    events.add_argument("paths", nargs=1, type=Path, metavar="FILE")
+    _add_reading(events)
+    return parser
+
+
+def _command(commands: Any, name: str, run: Callable[..., int], text: str) -> Any:
+    """The parser of a sub-command; `text` is its line in the list and its description."""
+    parser = commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+    parser.epilog = _EXIT
+    parser.add_argument("--character", default="humanoid49", help="name or MJCF file")
+    parser.set_defaults(run=run)
+    return parser
+
+
+def _add_reading(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--allow-short",
+        action="store_true",
+        help="take BVH files with another number of rows than the header says; "
+        "one row too few is only a warning, with the flag or without",
+    )
+    parser.add_argument("--names", type=Path, help="YAML or JSON map {joint: link}")
+    parser.add_argument("--scale", type=_above_zero, help="metres in a unit of the file")
+    parser.add_argument(
+        "--up",
+        choices=("auto", "y", "z"),
+        default="auto",
+        help="vertical axis of BVH files (default: along which their skeleton stands, else y)",
+    )
+    parser.add_argument(
+        "--source-fps",
+        type=_rate,
+        help="frames a second of BVH and AMC files, in place of what they say (AMC: 120)",
+    )
+    parser.add_argument("--fps", type=_rate, default=30.0, help="rate of the clips (default: 30)")
+    parser.add_argument("--floor", type=_finite, help="height of the recording's floor (m)")
+
+
+def _finite(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a number, got {text!r}")
+    return value
+
+
+def _above_zero(text: str) -> float:
+    value = _finite(text)
+    if not 1e-6 <= value <= 1e6:
+        raise argparse.ArgumentTypeError(f"expected a number above 0, such as 0.01, got {text!r}")
+    return value
+
+
+def _rate(text: str) -> float:
+    value = _finite(text)
+    if not 1 <= value <= _FASTEST_HZ:
+        raise argparse.ArgumentTypeError(
+            f"expected frames a second, from 1 to {_FASTEST_HZ}, got {text!r}"
+        )
+    return value
+
+
+def _import(args: argparse.Namespace, character: CharacterSpec) -> int:
+    reports = _reports(args, character)
+    if args.out:
+        _write_clips(args.out, reports, character)
+    console = Console()
+    console.print(file_table(reports))
+    _print_messages(console, reports)
+    if args.json:
+        args.json.write_text(json.dumps([report.plain() for report in reports], indent=1) + "\n")
+    return int(any(report.errors for report in reports))
+
+
+def _write_clips(folder: Path, reports: Sequence[FileReport], character: CharacterSpec) -> None:
+    """One .npz a file; files of one name get their old suffix into the new name."""
+    folder.mkdir(parents=True, exist_ok=True)
+    stems = [report.path.stem for report in reports]
+    for report in reports:
+        if report.clip and report.retarget:
+            twin = stems.count(report.path.stem) > 1
+            name = report.path.name.replace(".", "_") if twin else report.path.stem
+            clip = dataclasses.replace(report.clip, name=name)
+            write_npz(folder / f"{name}.npz", clip, report.retarget, character)
+
+
+def _events(args: argparse.Namespace, character: CharacterSpec) -> int:
+    (report,) = _reports(args, character)
+    console = Console()
+    if report.clip:
+        console.print(event_table(report, report.clip.fps))
+    _print_messages(console, [report])
+    return int(bool(report.errors))
+
+
+def _list(args: argparse.Namespace, character: CharacterSpec) -> int:
+    library = load_motions(MotionConfig(source=tuple(args.sources)), character)
+    console = Console()
+    console.print(getup_table(library.getups))
+    console.print(f"{len(library.poses)} poses for the pose prior, mirror images included")
+    return 0
+
+
+def _plot(args: argparse.Namespace, character: CharacterSpec) -> int:
+    from getup_jax.motion.getup.plot import plot_getups, plot_strategies
+
+    config = MotionConfig(source=tuple(args.sources), curves=tuple(args.curves))
+    library = load_motions(config, character)
+    if args.strategies:
+        plot_strategies(library.getups, character, args.out)
+    else:
+        plot_getups(library.getups, character, args.out)
+    Console().print(f"{args.out}: {len(library.getups)} get-ups")
+    return 0
+
+
+def _reports(args: argparse.Namespace, character: CharacterSpec) -> list[FileReport]:
+    files = [file for path in args.paths for file in _expand(path)]
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, TimeElapsedColumn(), console=console) as progress:
+        task = progress.add_task("retargeting", total=len(files))
+        results = _retarget(args, files, character, lambda path: progress.advance(task))
+    return [report_of(file, results[file], character) for file in files]
+
+
+def _retarget(
+    args: argparse.Namespace,
+    files: Sequence[Path],
+    character: CharacterSpec,
+    done: Callable[[Path], None],
+) -> dict[Path, Result]:
+    read = ReadOptions(up=args.up, allow_short=args.allow_short, fps=args.source_fps)
+    settings = RetargetSettings(
+        fps=args.fps,
+        metres=args.scale,
+        floor=args.floor,
+        names=read_map(args.names) if args.names else None,
+    )
+    jobs = [Job(file, character, read, settings) for file in files if file.suffix.lower() != ".npz"]
+    results = retarget_files(jobs, cpus(), done)
+    found = dict(zip([job.path for job in jobs], results, strict=True))
+    for file in files:
+        if file not in found:
+            try:
+                found[file] = read_npz(file, character)
+            except MotionError as error:
+                found[file] = error
+            done(file)
+    return found
+
+
+def _expand(path: Path) -> list[Path]:
+    """The motion files that an argument stands for; a missing file is reported later."""
+    if not path.is_dir():
+        return [path]
+    files = motion_files(path)
+    if not files:
+        raise MotionError(f"{path}: no motion files in this folder")
+    return files
+
+
+def _print_messages(console: Console, reports: list[FileReport]) -> None:
+    for report in reports:
+        for text in report.warnings:
+            console.print(f"warning: {report.path.name}: {text}", style="yellow", soft_wrap=True)
+        for text in report.errors:
+            console.print(f"error: {text}", style="red", soft_wrap=True)

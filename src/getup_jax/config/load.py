@@ -1,0 +1,153 @@
+"""YAML files and `section.key=value` overrides into a Config, and back.
+
+A YAML file holds only what differs from the defaults in `config/`. Values convert by
+the annotation of their field, so 3e-4 is a number although PyYAML reads it as text.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from getup_jax.config import Config, ConfigError, yaml_text
+from getup_jax.config.check import shown
+from getup_jax.config.convert import Text, describe, section
+from getup_jax.config.earlier import completed
+from getup_jax.core.resources import config_path, shipped_configs
+
+# Settings that are no more: what to use instead. What was saved with them is read without them.
+RETIRED = {
+    "ppo.critic_rate_scale": "ppo.critic_learning_rate, which does not follow the actor's",
+    "ppo.value_coefficient": "nothing: the critic has an optimiser of its own",
+}
+
+_DEEPEST = 10  # names in the key of an override
+
+
+class BrokenFileError(ConfigError):
+    """A config file is not YAML; `problem` is the text without the file's name."""
+
+    def __init__(self, file: Path, error: yaml_text.YamlError) -> None:
+        place = "" if error.line is None else f", line {error.line}"
+        self.problem = f"broken YAML: {error}"
+        super().__init__(f"{file}{place}: {self.problem}")
+
+
+def load_config(path: str | Path | None, overrides: Sequence[str] = ()) -> Config:
+    """The defaults, changed by a YAML file (None: by none) and then by overrides.
+
+    A key that a saved config lacks means what was so when it was saved, see config/earlier.py.
+    Raises ConfigError that names the key, or the file and line.
+    """
+    file = None if path is None else find_config(path)
+    return _build(file, {} if file is None else completed(_read_yaml(file)), overrides)
+
+
+def load_saved_config(file: Path) -> Config:
+    """What `dump_yaml` wrote, also of an earlier version with settings that are RETIRED now."""
+    values = completed(_read_yaml(file))
+    for key in RETIRED:
+        _remove(values, *key.split("."))
+    return _build(file, values, ())
+
+
+def _remove(values: dict[str, Any], section_name: str, name: str) -> None:
+    inner = values.get(section_name)
+    if isinstance(inner, dict):
+        inner.pop(name, None)
+
+
+def _build(file: Path | None, from_file: dict[str, Any], overrides: Sequence[str]) -> Config:
+    try:
+        merged = functools.reduce(_merge, map(_parse_override, overrides), from_file)
+        for key, instead in RETIRED.items():
+            first, name = key.split(".")
+            if isinstance(merged.get(first), dict) and name in merged[first]:
+                raise ConfigError(f"{key}: is no setting any more; use {instead}")
+        return section(merged, Config, "", None)
+    except ConfigError as error:
+        if file is None or not _is_bad(from_file):
+            raise
+        raise ConfigError(f"{error} (in {file})") from None
+
+
+def to_dict(config: Any) -> dict[str, Any]:
+    """A (sub-)config as plain dicts, lists and scalars: what `dump_yaml` writes."""
+    return {f.name: _plain(getattr(config, f.name)) for f in dataclasses.fields(config)}
+
+
+def dump_yaml(config: Config) -> str:
+    """Every setting as YAML text; `load_config` of it gives an equal Config."""
+    return yaml.safe_dump(to_dict(config), sort_keys=False, default_flow_style=None, width=100)
+
+
+def find_config(path: str | Path) -> Path:
+    """The file at `path`, else the shipped config of that name; ConfigError if neither."""
+    for candidate in (Path(path), config_path(path)):
+        if candidate.is_file():
+            return candidate
+    shipped = ", ".join(shipped_configs())
+    raise ConfigError(f"{path}: no such config file; the shipped configs are: {shipped}")
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value):
+        return to_dict(value)
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, dict):
+        return {name: _plain(item) for name, item in value.items()}
+    return value
+
+
+def _read_yaml(file: Path) -> dict[str, Any]:
+    """The mapping in a YAML file; an empty file is an empty mapping."""
+    try:
+        values = yaml_text.parse(file.read_bytes())
+    except OSError as error:
+        raise ConfigError(f"{file}: cannot be read: {error.strerror or error}") from None
+    except yaml_text.YamlError as error:
+        raise BrokenFileError(file, error) from None
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        raise ConfigError(f"{file}: expected a mapping of settings, got {describe(values)}")
+    return values
+
+
+def _parse_override(override: str) -> dict[str, Any]:
+    """`a.b=value` as {a: {b: value}}."""
+    key, equals, text = override.partition("=")
+    first, *inner = names = key.strip().split(".")
+    if not equals or not all(names) or len(names) > _DEEPEST:
+        raise ConfigError(f"{shown(override)}: expected section.key=value, such as ppo.epochs=4")
+    try:
+        value: Any = yaml_text.parse(text)
+    except yaml_text.YamlError as error:
+        raise ConfigError(f"{key}: broken YAML in {shown(text)}: {error}") from None
+    if value is not None and not isinstance(value, dict | list):
+        value = Text(text, value)
+    for name in reversed(inner):
+        value = {name: value}
+    return {first: value}
+
+
+def _merge(base: Any, change: Any) -> Any:
+    """`change` laid over `base`: mappings merge key by key, anything else replaces."""
+    if not isinstance(base, dict) or not isinstance(change, dict):
+        return change
+    both = {name: _merge(base[name], value) for name, value in change.items() if name in base}
+    return base | change | both
+
+
+def _is_bad(values: dict[str, Any]) -> bool:
+    try:
+        section(values, Config, "", None)
+    except ConfigError:
+        return True
+    return False

@@ -1,0 +1,1 @@
+"""Composite motion: body groups imitate clips while goals are reached."""

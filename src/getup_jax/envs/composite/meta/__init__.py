@@ -1,0 +1,1 @@
+"""Incremental learning from a trained policy."""

@@ -1,0 +1,1 @@
+"""Getting up from the floor, in the style that curves describe."""

@@ -1,0 +1,1 @@
+"""Start states, made before training and drawn from while it runs."""

@@ -1,0 +1,306 @@
+"""The get-up task [P 3 to 5]: follow three style curves from the floor to standing."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+from getup_jax.config import TaskConfig, TerrainConfig
+from getup_jax.core.masked_update import replace_rows
+from getup_jax.core.mirror import Symmetry
+from getup_jax.core.quaternion import angle, conjugate, multiply
+from getup_jax.core.types import Engine, StepOutput, take
+from getup_jax.envs.getup import rewards, terminations
+from getup_jax.envs.getup.action_decoder import Units
+from getup_jax.envs.getup.curriculum import (
+    assistive_wrench,
+    regions,
+    sampler_update,
+    start_prioritisation,
+)
+from getup_jax.envs.getup.curriculum.start_sampler import Draw, draw_starts, with_curves
+from getup_jax.envs.getup.drawn_curves import Curve, style_curve
+from getup_jax.envs.getup.episode import EpisodeState, Record, recorded, verdict
+from getup_jax.envs.getup.observation import Observer, Posture
+from getup_jax.envs.getup.resets.pool import Pool
+from getup_jax.motion.getup import curves
+from getup_jax.physics.character import CharacterSpec
+from getup_jax.physics.terrain import Ground
+from getup_jax.pose_prior.prior import PosePrior
+
+_RESET_CHUNK = 32  # episodes that start anew at once; a step rarely ends more of some hundred
+
+
+@struct.dataclass
+class World:
+    """Every array that the task reads and training does not change."""
+
+    prior: PosePrior | None  # None: the action is the pose
+    pool: Pool
+    terrain: Ground
+    points: jax.Array  # [G, 9, 3] control points of the styles
+    duration: jax.Array  # [G] s
+    neutral_rotation: jax.Array  # [L - 1, 4] joint rotations of the neutral pose
+    target_lower: jax.Array  # [J] lowest PD target (rad)
+    target_upper: jax.Array  # [J]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class GetUpTask:
+    """The `Environment` of the get-up task: `advance` is one step, `step` also resets."""
+
+    engine: Engine
+    character: CharacterSpec
+    observer: Observer
+    config: TaskConfig
+    latent_size: int  # 0 without a pose prior
+    terrain: TerrainConfig | None = None  # None: a flat plane
+    symmetry: Symmetry | None = None  # of observations and actions; None: there is none
+
+    @property
+    def observation_size(self) -> int:
+        """O."""
+        return self.observer.size
+
+    @property
+    def num_objectives(self) -> int:
+        """K: one for each of `objective_weights`."""
+        return len(self.objective_weights)
+
+    @property
+    def objective_weights(self) -> dict[str, float]:
+        """Objectives and their weights: all terms multiplied, and tracking alone where it is on."""
+        track = self.config.track_weight
+        return {"total": 1.0} | ({"track": track} if track > 0 else {})
+
+    @property
+    def action_size(self) -> int:
+        """A: the latent pose and one offset a hinge."""
+        return self.latent_size + self.character.num_joints
+
+    def init(self, world: World, key: jax.Array, num_envs: int) -> EpisodeState:
+        """B fresh episodes."""
+        key_start, key_state = jax.random.split(key)
+        learned = start_prioritisation.first(world.pool) if self.config.focus > 0 else None
+        levels = None
+        if learned is not None and self.config.assist > 0:
+            levels = jnp.ones_like(learned)
+        progress = None if self.terrain is None else regions.first(self.terrain)
+        drawn = draw_starts(self.config, world, key_start, num_envs, learned, progress, levels)
+        drawn = with_curves(self.config, world, key_start, drawn)
+        state = self._begin(world, drawn, levels)
+        return state.replace(key=key_state, focus=learned, assist=levels, curriculum=progress)
+
+    def stagger(self, state: EpisodeState, key: jax.Array) -> EpisodeState:
+        """Episodes [B] that are cut at any time; what comes after them runs to its end."""
+        left = state.duration + self.config.stand_time_s - state.time
+        share = jax.random.uniform(key, left.shape)
+        cut = state.time + share * left
+        return state.replace(until=cut if state.until is None else jnp.minimum(state.until, cut))
+
+    def step(
+        self, world: World, state: EpisodeState, action: jax.Array
+    ) -> tuple[EpisodeState, StepOutput]:
+        """One control step; episodes that end start anew."""
+        after, output = self.advance(world, state, action)
+        key_next, key_reset = jax.random.split(state.key)
+        learned, levels = sampler_update.learned(
+            self.config, world.pool, after, output, self.engine.control_dt
+        )
+        progress, output = sampler_update.progress(self.terrain, after, output)
+        size = action.shape[0]
+        drawn = draw_starts(self.config, world, key_reset, size, learned, progress, levels)
+
+        def fresh(index: jax.Array) -> EpisodeState:
+            picked = jax.tree.map(lambda x: x[index], drawn)
+            picked = with_curves(self.config, world, key_reset, picked, index[0])
+            begun = self._begin(world, picked, levels).replace(key=None)
+            if state.until is None or begun.until is not None:
+                return begun  # episodes are cut short, or none is
+            return begun.replace(until=jnp.full_like(begun.time, jnp.inf))  # only first ones are
+
+        done = output.terminated | output.truncated
+        # what belongs to the whole batch has no simulation axis and stays out of the rows
+        rows = after.replace(key=None, focus=None, assist=None, curriculum=None)
+        after = replace_rows(rows, done, fresh, _RESET_CHUNK)
+        after = after.replace(key=key_next, focus=learned, assist=levels, curriculum=progress)
+        return after, output.replace(observation=after.observation)
+
+    def _begin(self, world: World, drawn: Draw, levels: jax.Array | None) -> EpisodeState:
+        state = self.start(
+            world, drawn.getup, drawn.kind, drawn.row, curve=drawn.curve, region=drawn.region
+        )
+        if drawn.lasts is not None:
+            state = state.replace(until=state.time + drawn.lasts)
+        if drawn.helped is None or levels is None:
+            return state
+        cell = sampler_update.first_cell(world.pool, state, self.engine.control_dt)
+        most = self.config.assist * self.character.weight * levels[cell]
+        return state.replace(lift=jnp.where(drawn.helped, most, 0.0))
+
+    def start(
+        self,
+        world: World,
+        getup: jax.Array,
+        kind: jax.Array,
+        row: jax.Array,
+        curve: Curve | None = None,
+        region: jax.Array | None = None,
+    ) -> EpisodeState:
+        """Episodes of the given styles [B], kinds of start [B] and rows [B] of the pool.
+
+        curve: what they follow, with starts along it at the same phase; None: that of their style.
+        region [B]: where on irregular ground; None is the first one, as on a flat plane.
+        """
+        index = world.pool.table[kind, 0 if region is None else region, getup, row]
+        physics = take(world.pool.physics, index)
+        size = len(getup)
+        own = style_curve(world, getup)
+        curve = own if curve is None else curve
+        state = EpisodeState(
+            physics=physics,
+            observation=jnp.zeros((size, self.observation_size), jnp.float32),
+            action=jnp.zeros((size, self.action_size), jnp.float32),
+            getup=getup,
+            kind=kind,
+            time=world.pool.time[index] * (curve.duration / own.duration),
+            points=curve.points,
+            duration=curve.duration,
+            low_steps=jnp.zeros(size, jnp.int32),
+            head_steps=jnp.zeros(size, jnp.int32),
+            record=Record.empty(size),
+            key=jnp.zeros(2, jnp.uint32),
+            region=self._region_of(region, getup),
+            misfit=None if world.pool.misfit is None else world.pool.misfit[index],
+        )
+        # The filter keeps most of the last action, so the first target must be the start pose.
+        angles, condition = physics.kinematics.qpos[:, 7:], self.targets(state)[:, 0]
+        flat = self.terrain is None
+        hold = self.units(world).first(self.config, flat, angles, condition)
+        if world.pool.action is not None:
+            given = world.pool.action[index]
+            hold = jnp.where(jnp.isnan(given), hold, given)
+        state = state.replace(action=hold)
+        return state.replace(observation=self._observe(state, self._posture(world, state)))
+
+    def advance(
+        self, world: World, state: EpisodeState, action: jax.Array
+    ) -> tuple[EpisodeState, StepOutput]:
+        """One control step without resets; `observation` is the final one."""
+        filtered = self.config.filter * action + (1.0 - self.config.filter) * state.action
+        target = self.servo_target(world, state, filtered)
+        physics = self.engine.step(state.physics, target, wrench=self._hand(world, state))
+        state = state.replace(
+            physics=physics, action=filtered, time=state.time + self.engine.control_dt
+        )
+        posture = self._posture(world, state)
+        target = self.targets(state)[:, 0]
+        terms = self._reward_terms(world, state, posture, target)
+        finite = physics.kinematics.finite
+        terms = {name: jnp.where(finite, value, 0.0) for name, value in terms.items()}
+        control_dt = self.engine.control_dt
+        gap = terminations.head_gap(self.character, world.terrain, physics.kinematics)
+        head = gap < self.config.head_clearance_m
+        state, causes = terminations.counted(self.config, control_dt, state, terms["task"], head)
+        causes["not_finite"] = ~finite
+        for name in self.objective_weights:
+            terms[name] = terminations.paid(self.config, control_dt, state, terms[name])
+        terminated = causes["low_reward"] | causes["head"] | causes["not_finite"]
+        half_step = 0.5 * control_dt
+        end = state.duration + self.config.stand_time_s - half_step
+        if state.until is not None:
+            end = jnp.minimum(end, state.until - half_step)
+        truncated = ~terminated & (state.time > end)
+        stand_s, value = self.config.stand_time_s, posture.features
+        state = recorded(state, value, target, terms["task"], stand_s)
+        observation = jnp.where(finite[:, None], self._observe(state, posture), 0.0)
+        state = state.replace(observation=observation)
+        metrics = {f"reward_{name}": value for name, value in terms.items()}
+        metrics |= {f"ended_{name}": value.astype(jnp.float32) for name, value in causes.items()}
+        output = StepOutput(
+            observation=observation,
+            final_observation=observation,
+            reward=jnp.stack([terms[name] for name in self.objective_weights], axis=-1),
+            terminated=terminated,
+            truncated=truncated,
+            metrics=metrics,
+            episode=self._verdict(state, truncated),
+        )
+        return state, output
+
+    def _verdict(self, state: EpisodeState, truncated: jax.Array) -> dict[str, jax.Array]:
+        episode = verdict(state, truncated, self._full_steps(state))
+        if state.until is not None or state.lift is not None:
+            whole = sampler_update.runs_to_the_end(state) & sampler_update.is_alone(state)
+            episode = {name: jnp.where(whole, x, jnp.nan) for name, x in episode.items()}
+        if state.region is None:
+            return episode
+        return episode | regions.by_region(episode, state.region)
+
+    def _hand(self, world: World, state: EpisodeState) -> jax.Array | None:
+        """Wrench [B, 6] of the helping hand; None: there is none."""
+        if state.lift is None:
+            return None
+        measured = state.observation[:, self.observer.slices()["features"]]
+        target = self.targets(state)[:, 0]
+        kinematics = state.physics.kinematics
+        normal = world.terrain.normal(kinematics.qpos[:, :2])
+        held = state.record.steps * self.engine.control_dt < self.config.assist_s
+        most = jnp.where(held, state.lift, 0.0)
+        return assistive_wrench.wrench(
+            self.observer.links, kinematics, measured, target, normal, most
+        )
+
+    def servo_target(self, world: World, state: EpisodeState, filtered: jax.Array) -> jax.Array:
+        """Hinge targets [B, J]: q = decoder(z, c) + dq [P 3.4], c the curve values now."""
+        target = self.units(world).target(filtered, self.targets(state)[:, 0])
+        return jnp.clip(target, world.target_lower, world.target_upper)
+
+    def units(self, world: World) -> Units:
+        """What the actions mean."""
+        neutral = jnp.asarray(self.character.neutral_qpos[7:], jnp.float32)
+        return Units(world.prior, self.config.offset_scale, neutral)
+
+    def _region_of(self, region: jax.Array | None, getup: jax.Array) -> jax.Array | None:
+        """The state's region [B]: None on a flat plane, the first one where none is given."""
+        if self.terrain is None:
+            return None
+        return jnp.zeros_like(getup) if region is None else region
+
+    def targets(self, state: EpisodeState) -> jax.Array:
+        """Curve values [B, n, 3] at the look-ahead times; the first one is now."""
+        ahead = jnp.asarray(self.config.lookahead_s, jnp.float32)
+        s = (state.time[:, None] + ahead) / state.duration[:, None]
+        return curves.evaluate(state.points[:, None], s)
+
+    def _posture(self, world: World, state: EpisodeState) -> Posture:
+        return self.observer.posture(state.physics.kinematics, world.terrain)
+
+    def _observe(self, state: EpisodeState, posture: Posture) -> jax.Array:
+        return self.observer.observe(posture, self.targets(state), state.action)
+
+    def _reward_terms(
+        self, world: World, state: EpisodeState, posture: Posture, target: jax.Array
+    ) -> dict[str, jax.Array]:
+        config = self.config
+        omega = posture.link_angular_velocity.reshape(len(target), -1)
+        joint_error = angle(multiply(conjugate(world.neutral_rotation), posture.joint_rotation))
+        end = state.points[:, -1, 0]
+        terms = rewards.terms(posture.features, target, end, omega, joint_error)
+        terms["total"] = rewards.sharpened(terms, config.sharpness)
+        if config.track_weight > 0:
+            terms["track"] = rewards.tracking(terms, config.track_sharpness)
+        if world.prior is None:  # nothing that offsets could be unnatural to [P 6.4]
+            return terms
+        offset = config.offset_scale * state.action[:, self.latent_size :]
+        terms["natural"] = rewards.natural(offset, config.offset_limit_rad)
+        terms["total"] = terms["total"] * terms["natural"]
+        return terms
+
+    def _full_steps(self, state: EpisodeState) -> jax.Array:
+        """Steps [B] that an episode with this start has, if it does not end early."""
+        left = state.duration + self.config.stand_time_s - state.time
+        return state.record.steps + jnp.round(left / self.engine.control_dt)

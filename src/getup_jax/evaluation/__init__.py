@@ -1,0 +1,1 @@
+"""What trained policies do: episodes without noise, their metrics, tables, plots and films."""

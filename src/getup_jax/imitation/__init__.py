@@ -1,0 +1,1 @@
+"""What a policy is taught by regression before it trains by itself."""

@@ -1,0 +1,154 @@
+"""Lessons: what a policy is taught by regression of servo targets, before it trains by itself."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import optax
+from flax import struct
+
+from getup_jax.envs.getup import rewards
+from getup_jax.envs.getup.action_decoder import Units
+from getup_jax.envs.getup.task import GetUpTask, World
+from getup_jax.networks import gaussian
+from getup_jax.rl.actor_critic import normalized
+from getup_jax.rl.learner import Learner
+from getup_jax.rl.minibatch import Loss, run_minibatches, shuffled_minibatches
+from getup_jax.rl.rollout import rollout
+from getup_jax.rl.state import PolicyState
+
+Log = Callable[[str], None]
+
+_NOISE = 0.2  # standard deviation of the actions, to see what is beside the way, too
+_EPOCHS, _MINIBATCH = 30, 1024
+_LEARNING_RATES = 1e-3, 1e-5
+# Beside the squared error of the targets (rad^2):
+_NEAR = 0.02  # to the latents of the lesson, since others may decode to the same pose
+_NATURAL = 0.01  # (|dq|_1 / c)^2 of equation 3: what latents can say, offsets should not
+
+
+@struct.dataclass
+class Lesson:
+    """N observations and what to do there; a pytree of [N, ...]."""
+
+    observation: jax.Array  # [N, O] raw, its action in the units of the policy that learns
+    action: jax.Array  # [N, A] likewise
+    target: jax.Array  # [N, J] servo target (rad)
+    condition: jax.Array  # [N, 3]
+
+
+def watched(
+    learner: Learner,
+    env: GetUpTask,
+    world: World,
+    mean_action: Callable[[jax.Array], jax.Array],
+    lesson: Callable[[jax.Array], Lesson],
+    rollouts: int,
+    key: jax.Array,
+) -> Lesson:
+    """Lessons from what a policy sees in rollouts that go on from one to the next.
+
+    Args:
+        learner: whose numbers of simulations and steps a rollout has.
+        env: where the policy acts.
+        world: of `env`.
+        mean_action: [N, A] of the policy for raw observations [N, O] of `env`, inside jit.
+        lesson: of raw observations [N, O] likewise.
+        rollouts: how many.
+        key: of the starts and the noise.
+    """
+    num_envs, num_steps = learner.config.num_envs, learner.config.num_steps
+
+    def act(observation: jax.Array, key_action: jax.Array) -> tuple[jax.Array, jax.Array]:
+        mean = mean_action(observation)
+        std = jnp.full_like(mean, _NOISE)
+        action = gaussian.sample(key_action, mean, std)
+        return action, gaussian.log_prob(action, mean, std)
+
+    @jax.jit
+    def collect(world: World, state: Any, key: jax.Array) -> tuple[Any, Lesson]:
+        collected = rollout(env, world, state, act, key, num_steps)
+        observation = collected.transition.observation
+        flat = observation.reshape(-1, observation.shape[-1])
+        return collected.environment, lesson(flat)
+
+    keys = jax.random.split(key, rollouts + 1)
+    state = env.init(world, keys[0], num_envs)
+    parts = []
+    for key_roll in keys[1:]:
+        state, part = collect(world, state, key_roll)
+        parts.append(jax.device_get(part))
+    return join(parts)
+
+
+def join(parts: list[Lesson]) -> Lesson:
+    """All of them in one, in their order."""
+    return jax.tree.map(lambda *x: jnp.concatenate(x), *parts)
+
+
+def held_out(lessons: Lesson, size: int) -> tuple[Lesson, Lesson]:
+    """All but the last `size`, and those."""
+    first, last = slice(None, -size), slice(-size, None)
+    return jax.tree.map(lambda x: x[first], lessons), jax.tree.map(lambda x: x[last], lessons)
+
+
+def taught(
+    learner: Learner, policy: PolicyState, units: Units, lessons: Lesson, key: jax.Array
+) -> PolicyState:
+    """The policy after regression of its targets, with latents as far as they can say them."""
+    latents, limit = units.latent_size, learner.env.config.offset_limit_rad
+
+    def loss(actor: Any, part: Lesson) -> tuple[jax.Array, dict[str, jax.Array]]:
+        seen = normalized(policy, part.observation)
+        action = learner.model.mean(actor, seen)
+        miss = jnp.mean(jnp.square(units.target(action, part.condition) - part.target))
+        (latent, offset), (near, _) = (jnp.split(a, [latents], -1) for a in (action, part.action))
+        if units.prior is None:
+            return miss, {"miss": miss}
+        far = jnp.mean(jnp.square(latent - near))
+        unnatural = jnp.mean(1.0 - rewards.natural(units.offset_scale * offset, limit))
+        return miss + _NEAR * far + _NATURAL * unnatural, {"miss": miss}
+
+    actor = regress(loss, policy.actor, lessons, key, _EPOCHS, _MINIBATCH)
+    return dataclasses.replace(policy, actor=actor)
+
+
+def regress(
+    loss: Loss, parameters: Any, samples: Any, key: jax.Array, epochs: int, minibatch: int
+) -> Any:
+    """The parameters after epochs of Adam, its rate falling along a cosine.
+
+    samples: pytree of [N, ...]; an epoch leaves out what fills no minibatch of them.
+    """
+    count = len(jax.tree.leaves(samples)[0])
+    size = min(minibatch, count)
+    updates = count // size
+    first, last = _LEARNING_RATES
+    optimiser = optax.adam(optax.cosine_decay_schedule(first, epochs * updates, last / first))
+
+    @jax.jit
+    def epoch(carry: tuple[Any, Any], samples: Any, key: jax.Array) -> tuple[Any, Any]:
+        order = shuffled_minibatches(key, 1, updates * size, size)
+        return run_minibatches(loss, optimiser, *carry, samples, order)[:2]
+
+    carry = (parameters, optimiser.init(parameters))
+    samples = jax.tree.map(jnp.asarray, samples)
+    for key_epoch in jax.random.split(key, epochs):
+        carry = epoch(carry, samples, key_epoch)
+    return carry[0]
+
+
+def compare(
+    learner: Learner, policy: PolicyState, units: Units, lessons: Lesson
+) -> tuple[float, float]:
+    """How far the policy's servo targets are from the lessons' (degrees, rms), and |dq|_1 (rad)."""
+    action = jax.jit(learner.act)(policy, lessons.observation)
+    miss = jnp.mean(jnp.square(units.target(action, lessons.condition) - lessons.target))
+    offset = units.offset_scale * action[:, units.latent_size :]
+    length = jnp.mean(jnp.sum(jnp.abs(offset), axis=-1))
+    return math.degrees(math.sqrt(miss)), float(length)

@@ -1,0 +1,1 @@
+"""Motions made by hand, and more of them out of few."""

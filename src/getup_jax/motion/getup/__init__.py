@@ -1,0 +1,1 @@
+"""Get-ups in clips, and the style curves that describe them."""

@@ -1,0 +1,1 @@
+"""Motion files of every format, read and written."""

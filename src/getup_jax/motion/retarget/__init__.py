@@ -1,0 +1,1 @@
+"""Recordings of any skeleton on a character."""

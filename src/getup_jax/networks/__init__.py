@@ -1,0 +1,1 @@
+"""Networks and distributions, of any policy, critic and prior."""

@@ -1,0 +1,1 @@
+"""The conditional VAE of human poses: its data, training, cache and use."""

@@ -1,0 +1,1 @@
+"""What is shipped of a run: the policy and its model card."""

@@ -1,0 +1,1 @@
+"""PPO for any environment; it knows no task."""

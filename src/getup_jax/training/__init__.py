@@ -1,0 +1,1 @@
+"""A training run, from the settings to the last checkpoint."""

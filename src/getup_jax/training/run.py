@@ -1,0 +1,162 @@
+"""One training run, from the settings to the last checkpoint."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from getup_jax.config import Config
+from getup_jax.envs.composite.build import BuiltComposite, build_composite
+from getup_jax.envs.composite.discriminator_rewards import make_objectives
+from getup_jax.envs.composite.meta.chain import with_meta
+from getup_jax.envs.composite.meta.meta_policy import MetaTask
+from getup_jax.envs.getup.build import build_task
+from getup_jax.envs.getup.episode import with_shared
+from getup_jax.envs.getup.styled import with_objectives
+from getup_jax.envs.getup.task import World
+from getup_jax.imitation import action_distillation
+from getup_jax.imitation.dagger import Stage, rehearse
+from getup_jax.imitation.slope_warm_start import teach_footing
+from getup_jax.physics.body_digest import body_digest
+from getup_jax.rl.learner import Learner, make_learner
+from getup_jax.rl.state import PolicyState
+from getup_jax.runtime import checkpoint
+from getup_jax.runtime.checkpoint import LoadedPolicy
+from getup_jax.runtime.console import Display, count, duration
+from getup_jax.runtime.metric_file import MetricsWriter, tensorboard_module
+from getup_jax.runtime.run_folder import prepare, resume_command
+from getup_jax.runtime.signals import StopRequest
+from getup_jax.training.loop import (
+    CarryOver,
+    Job,
+    Loop,
+    TrainingError,
+    num_iterations,
+    steps_per_iteration,
+)
+
+__all__ = ["Job", "TrainingError", "build_job", "run"]
+
+Log = Callable[[str], None]
+
+
+def build_job(config: Config, log: Log) -> Job:
+    """The task and the learner that the settings ask for."""
+    if config.composite_motion:
+        return build_composite_job(config, log)[1]
+    task, objectives = build_task(config, log), None
+    weights = tuple(task.environment.objective_weights.values())
+    if config.composite is not None:
+        task = styled = with_objectives(config, task, log)
+        objectives, weights = make_objectives(styled.environment, config.composite), None
+    learner = make_learner(
+        task.environment,
+        config.network,
+        config.ppo,
+        total_steps=config.train.total_steps,
+        weights=weights,
+        objectives=objectives,
+    )
+    carry_over = _carry_over(learner, task.world, config)
+    body = body_digest(task.environment.character.model)
+    return Job(learner, task.world, task.prior, carry_over, share=with_shared, body=body)
+
+
+def _carry_over(learner: Learner, world: World, config: Config) -> CarryOver:
+    def carry_over(policy: PolicyState, loaded: LoadedPolicy, log: Log) -> PolicyState:
+        teacher = action_distillation.make_teacher(config, learner, world, loaded, policy)
+        key = jax.random.PRNGKey(config.seed)
+        policy = action_distillation.carry_over(learner, world, policy, teacher, key, log)
+        on_plane = learner.env.terrain is None or loaded.config.terrain is not None
+        if world.prior is None or on_plane:
+            return policy
+        return teach_footing(learner, world, policy, key, log)
+
+    return carry_over
+
+
+def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Job]:
+    """The task, and the learner and the world of composite motion."""
+    built = build_composite(config, log)
+    env, world, composite = built.environment, built.world, built.environment.config
+    if composite.meta is not None:
+        log(f"meta policy: {composite.meta}")
+        env, world = with_meta(config, built)
+    learner = make_learner(
+        env,
+        config.network,
+        config.ppo,
+        total_steps=config.train.total_steps,
+        objectives=make_objectives(built.environment, composite),
+    )
+    prepare = None
+    if composite.rehearse:
+        prepare = functools.partial(_rehearse, learner, built, world, config.seed)
+    body = body_digest(built.environment.character.model)
+    return built, Job(learner=learner, world=world, prior=None, prepare=prepare, body=body)
+
+
+def _rehearse(
+    learner: Learner, built: BuiltComposite, world: Any, seed: int, policy: PolicyState, log: Log
+) -> PolicyState:
+    env = learner.env
+    new = np.array(env.new) if isinstance(env, MetaTask) else None
+    return rehearse(learner, Stage(built, world, new), policy, jax.random.PRNGKey(seed), log)
+
+
+def run(
+    config: Config,
+    run_folder: str | Path,
+    resume: bool = False,
+    quiet: bool = False,
+    build: Callable[[Config, Log], Job] = build_job,
+) -> int | None:
+    """Train until `train.total_steps`, or until Ctrl-C, SIGTERM or SIGHUP.
+
+    Args:
+        config: the settings; written into the folder.
+        run_folder: gets config.yaml, metrics.jsonl and checkpoints/.
+        resume: go on from the folder's newest checkpoint, where it has one.
+        quiet: print nothing.
+        build: makes the task and the learner.
+
+    Returns:
+        None at the end of the run, else the number of the signal that stopped it.
+
+    Raises RunError, CheckpointError and TrainingError with texts for the user.
+    """
+    folder = Path(run_folder)
+    total = num_iterations(config) * steps_per_iteration(config)
+    with Display(total, quiet) as display, StopRequest(display.log) as stop:
+        prepare(folder, config, resume, display.log)
+        if _finished(folder, config):
+            display.log(f"{folder} has all of its {count(total)} steps; raise train.total_steps")
+            return None
+        if config.train.tensorboard:
+            tensorboard_module()  # fail now rather than after minutes of compiling
+        begin = time.monotonic()
+        display.log(f"building the task ({jax.devices()[0].platform}) ...")
+        loop = Loop(config, folder, build(config, display.log), display)
+        with MetricsWriter(folder, loop.done, config.train.tensorboard) as writer, stop.armed():
+            loop.train(writer, stop)
+        display.close()
+        display.log(_closing(folder, loop, config, time.monotonic() - begin))
+        return stop.signal if loop.done < num_iterations(config) else None
+
+
+def _finished(folder: Path, config: Config) -> bool:
+    steps = checkpoint.steps(folder / checkpoint.CHECKPOINTS)
+    return bool(steps) and int(steps[-1].name) >= num_iterations(config)
+
+
+def _closing(folder: Path, loop: Loop, config: Config, seconds: float) -> str:
+    if loop.done < num_iterations(config):
+        return f"saved {loop.saved}; continue with\n  {resume_command(folder)}"
+    done = f"{count(loop.steps)} steps done, {duration(seconds)} this time"
+    return f"{done}; evaluate them with\n  getup-eval --ckpt {folder}"
