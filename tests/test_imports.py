@@ -12,25 +12,19 @@ import getup_jax
 
 PACKAGE = Path(getup_jax.__file__).parent
 
-# From left to right; a name is a module or a sub-package of getup_jax.
+# From left to right; a name is a sub-package of getup_jax.
 LAYERS = [
-    ["types", "config", "rotation", "rows", "mirror"],
-    ["convert", "paths", "settings", "yaml_text"],
-    ["storage", "manifest", "checkpoint", "metrics", "progress", "journal", "runfolder", "stop"],
-    ["physics", "nets", "motion"],
-    ["tasks"],
-    ["grounds"],
-    ["algo"],
-    ["lessons"],
-    ["footing", "transfer", "rehearsal"],
-    ["loop", "train"],
-    ["conditions", "naturalness", "episodes", "scores", "score_table", "video", "eval_plot"],
-    ["control_gain"],
-    ["composite"],
-    ["composite_card"],
-    ["evaluate", "model_card", "export", "search"],
-    ["eval_options"],
-    ["cli", "editor"],
+    ["core"],
+    ["config"],
+    ["runtime", "networks", "physics"],
+    ["motion"],
+    ["pose_prior", "rl"],
+    ["envs"],
+    ["imitation"],
+    ["training"],
+    ["evaluation"],
+    ["release", "trajectory_search", "editor"],
+    ["cli"],
 ]
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
 
@@ -40,8 +34,8 @@ def modules() -> list[Path]:
 
 
 def part_of(path: Path) -> str:
-    """The layer name of a file: its sub-package, or its own name at the top."""
-    return path.relative_to(PACKAGE).with_suffix("").parts[0]
+    """The layer name of a file: its sub-package."""
+    return path.relative_to(PACKAGE).parts[0]
 
 
 def imported(source: str, package: str) -> set[str]:
@@ -68,15 +62,15 @@ def own_parts(path: Path) -> set[str]:
 @pytest.mark.parametrize(
     ("source", "expected"),
     [
-        ("import getup_jax.algo.gae", {"getup_jax.rl.gae"}),
-        ("from getup_jax import paths as p", {"getup_jax.core.resources"}),
-        ("def f():\n    from getup_jax.tasks import getup", {"getup_jax.envs.getup.task"}),
-        ("from . import a", {"getup_jax.nets.a"}),
-        ("from ..tasks import b", {"getup_jax.tasks.b"}),
+        ("import getup_jax.rl.gae", {"getup_jax.rl.gae"}),
+        ("from getup_jax import core as c", {"getup_jax.core"}),
+        ("def f():\n    from getup_jax.envs.getup import task", {"getup_jax.envs.getup.task"}),
+        ("from . import a", {"getup_jax.rl.a"}),
+        ("from ..envs import b", {"getup_jax.envs.b"}),
     ],
 )
 def test_the_reader_of_imports(source, expected):
-    assert imported(source, "getup_jax.nets") == expected
+    assert imported(source, "getup_jax.rl") == expected
 
 
 def test_every_module_has_a_layer():
@@ -91,12 +85,21 @@ def test_imports_flow_one_way(path):
     assert not wrong, f"{path.relative_to(PACKAGE)} imports {sorted(wrong)} of a layer to its right"
 
 
+def test_the_learner_knows_no_task():
+    files = [path for path in modules() if part_of(path) == "rl"]
+    parts = {part for path in files for part in own_parts(path)}
+    assert parts <= {"core", "config", "networks", "rl"}
+
+
 @pytest.mark.parametrize(
     "name",
-    ["convert", "settings", "paths", "config", "runfolder", "cli", "eval_options", "yaml_text"],
+    [
+        *("config", "core/resources.py", "runtime/run_folder.py"),
+        *("cli/main.py", "evaluation/options.py", "editor/options.py"),
+    ],
 )
 def test_what_answers_at_once_imports_nothing_heavy(name):
-    files = [path for path in modules() if part_of(path) == name]
+    files = [path for path in modules() if path.is_relative_to(PACKAGE / name)]
     assert files
     names = {n for path in files for n in imported(path.read_text(encoding="utf-8"), "getup_jax")}
     outside = {name.split(".")[0] for name in names} - set(sys.stdlib_module_names)

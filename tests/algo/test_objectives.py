@@ -11,7 +11,10 @@ from probes import Probe, make_world
 from tiny_composite import COMPOSITE, CONFIG, tiny_composite
 
 from getup_jax.config import NetworkConfig, PPOConfig
-from getup_jax.envs.composite.discriminator_rewards import Objectives, make_objectives
+from getup_jax.envs.composite.discriminator_rewards import (
+    DiscriminatorRewards,
+    make_discriminator_rewards,
+)
 from getup_jax.physics.character import load_character
 from getup_jax.rl.discriminator import Discriminator
 from getup_jax.rl.learner import Learner, make_learner
@@ -21,9 +24,11 @@ AS_USERS = {"xla_backend_optimization_level": 3, "xla_cpu_use_fusion_emitters": 
 PROBE_PPO = PPOConfig(num_envs=16, num_steps=8, minibatch_size=32, popart=True)
 
 
-def _objectives(separate: bool = True, weights=(1.0,), names=("goal",)) -> Objectives:
-    """Objectives without an imitation: all rewards are the environment's."""
-    return Objectives(names, weights, (), Discriminator(COMPOSITE.discriminator), 1 / 30, separate)
+def _objectives(separate: bool = True, weights=(1.0,), names=("goal",)) -> DiscriminatorRewards:
+    """DiscriminatorRewards without an imitation: all rewards are the environment's."""
+    return DiscriminatorRewards(
+        names, weights, (), Discriminator(COMPOSITE.discriminator), 1 / 30, separate
+    )
 
 
 def _train(learner: Learner, iterations: int = 5):
@@ -76,7 +81,7 @@ def built():
 def judged(built):
     """A hand-made rollout of real windows, judged once."""
     env, world = built.environment, jax.device_put(built.world)
-    objectives = make_objectives(env, COMPOSITE)
+    objectives = make_discriminator_rewards(env, COMPOSITE)
 
     def run(key):
         states = objectives.init(key)
@@ -88,7 +93,7 @@ def judged(built):
 
         _, output = jax.lax.scan(step, env_state, None, length=4)
         transition = _transition(output)
-        return transition, *objectives.judge(world, states, transition, key)
+        return transition, *objectives.score(world, states, transition, key)
 
     return objectives, world, jax.jit(run)(jax.random.key(0))
 

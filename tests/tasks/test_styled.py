@@ -19,7 +19,7 @@ from getup_jax.config import (
     NetworkConfig,
     PPOConfig,
 )
-from getup_jax.envs.composite.discriminator_rewards import make_objectives
+from getup_jax.envs.composite.discriminator_rewards import make_discriminator_rewards
 from getup_jax.envs.composite.reference_windows import travel
 from getup_jax.envs.getup.build import assemble
 from getup_jax.envs.getup.styled import with_objectives
@@ -101,9 +101,9 @@ def test_one_objective_is_plain_ppo_bit_for_bit(built):
     composite = CompositeConfig(task="getup", terms=("total",))
     config = config_with(composite)
     task = with_objectives(config, built, silent)
-    objectives = make_objectives(task.environment, composite)
+    objectives = make_discriminator_rewards(task.environment, composite)
     plain = make_learner(built.environment, NETWORK, PPO, 1000)
-    same = make_learner(task.environment, NETWORK, PPO, 1000, objectives=objectives)
+    same = make_learner(task.environment, NETWORK, PPO, 1000, reward_model=objectives)
     found = []
     for learner, world in ((plain, built.world), (same, task.world)):
         state = jax.jit(learner.init)(world, jax.random.PRNGKey(1))
@@ -120,8 +120,8 @@ def test_one_objective_is_plain_ppo_bit_for_bit(built):
 
 
 def test_all_critics_and_the_discriminator_learn(styled):
-    objectives = make_objectives(styled.environment, STYLE)
-    learner = make_learner(styled.environment, NETWORK, PPO, 1000, objectives=objectives)
+    objectives = make_discriminator_rewards(styled.environment, STYLE)
+    learner = make_learner(styled.environment, NETWORK, PPO, 1000, reward_model=objectives)
     state = jax.jit(learner.init)(styled.world, jax.random.PRNGKey(1))
     iterate = jax.jit(learner.iteration)
     for _ in range(2):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -19,7 +19,6 @@ from flax import struct
 
 from getup_jax.config import NetworkConfig, PPOConfig
 from getup_jax.core.types import Environment
-from getup_jax.envs.composite.discriminator_rewards import Objectives
 from getup_jax.networks import gaussian
 from getup_jax.rl import ppo, schedule, weight_average
 from getup_jax.rl.actor_critic import ActorCritic, make_actor_critic, normalized, observe
@@ -29,7 +28,26 @@ from getup_jax.rl.rollout import Rollout, Transition, rollout, summarize
 from getup_jax.rl.state import LearnerState, PolicyState, TrainState, owned
 
 # folded into keys, so that runs without them draw what they did
-_JUDGE, _DISCRIMINATORS, _STAGGER = 2, 3, 4
+_REWARDS, _DISCRIMINATORS, _STAGGER = 2, 3, 4
+
+
+class RewardModel(Protocol):
+    """Rewards that are learned: trained on every rollout, they score it before values are estimated."""
+
+    @property
+    def critic_weights(self) -> tuple[float, ...]:
+        """[K] of the critics' advantages."""
+        ...
+
+    def init(self, key: jax.Array) -> dict[str, Any]:
+        """Fresh discriminators by name."""
+        ...
+
+    def score(
+        self, world: Any, states: dict[str, Any], transition: Transition, key: jax.Array
+    ) -> tuple[dict[str, Any], Transition, dict[str, jax.Array]]:
+        """The discriminators after training, a rollout [T, B] with all rewards, and metrics."""
+        ...
 
 
 @struct.dataclass
@@ -50,7 +68,7 @@ class Learner:
     config: PPOConfig
     weights: tuple[float, ...]  # [K] of the critics, their sum is 1
     total_steps: int  # samples of the whole run
-    objectives: Objectives | None = None  # None: the environment gives all rewards
+    reward_model: RewardModel | None = None  # None: the environment gives all rewards
 
     def init(self, world: Any, key: jax.Array) -> TrainState:
         """The state before the first iteration."""
@@ -71,9 +89,9 @@ class Learner:
     def init_learner(self, key: jax.Array) -> LearnerState:
         """The learner's part of `init`; needs no world, so a checkpoint's form can be had alone."""
         learner = self.model.init(key, self.config)
-        if self.objectives is None:
+        if self.reward_model is None:
             return learner
-        states = self.objectives.init(jax.random.fold_in(key, _DISCRIMINATORS))
+        states = self.reward_model.init(jax.random.fold_in(key, _DISCRIMINATORS))
         return dataclasses.replace(learner, discriminators=states)
 
     def iteration(self, world: Any, state: TrainState) -> tuple[TrainState, dict[str, jax.Array]]:
@@ -94,8 +112,8 @@ class Learner:
         """The rest of an iteration: all that is done with what `collect` gave."""
         key, stage = _iteration_key(state), self.stage(state)
         _, key_update = jax.random.split(key)
-        learner, transition, judged = self._judge(
-            world, state.learner, collected.transition, jax.random.fold_in(key, _JUDGE)
+        learner, transition, of_rewards = self._rewarded(
+            world, state.learner, collected.transition, jax.random.fold_in(key, _REWARDS)
         )
         learner, samples, explained = estimate(self.model, learner, transition, self.config)
         learner, metrics = self._improve(state.iteration, learner, samples, stage, key_update)
@@ -104,7 +122,7 @@ class Learner:
             "ppo/explained_variance": explained,
             "ppo/learning_rate": stage.learning_rate,
         }
-        metrics |= judged
+        metrics |= of_rewards
         state = TrainState(
             learner=dataclasses.replace(learner, policy=policy),
             environment=collected.environment,
@@ -155,13 +173,13 @@ class Learner:
 
         return rollout(self.env, world, state.environment, policy, key, self.config.num_steps)
 
-    def _judge(
+    def _rewarded(
         self, world: Any, learner: LearnerState, transition: Transition, key: jax.Array
     ) -> tuple[LearnerState, Transition, dict[str, jax.Array]]:
         """The rollout with the rewards that only discriminators know."""
-        if self.objectives is None or learner.discriminators is None:
+        if self.reward_model is None or learner.discriminators is None:
             return learner, transition, {}
-        states, transition, metrics = self.objectives.judge(
+        states, transition, metrics = self.reward_model.score(
             world, learner.discriminators, transition, key
         )
         return dataclasses.replace(learner, discriminators=states), transition, metrics
@@ -236,7 +254,7 @@ def make_learner(
     ppo_config: PPOConfig,
     total_steps: int,
     weights: Sequence[float] | None = None,
-    objectives: Objectives | None = None,
+    reward_model: RewardModel | None = None,
 ) -> Learner:
     """A learner for the environment.
 
@@ -245,13 +263,13 @@ def make_learner(
         network_config: of actor and critic.
         ppo_config: see `PPOConfig`.
         total_steps: samples of the whole run, for the schedules.
-        weights: [K] of the critics, scaled here to a sum of 1; None: those of the objectives, or
+        weights: [K] of the critics, scaled here to a sum of 1; None: those of the reward model, or
             all the same.
-        objectives: of composite motion; None: the environment gives all rewards.
+        reward_model: of composite motion; None: the environment gives all rewards.
     """
     count = env.num_objectives
     if weights is None:
-        weights = [1.0] * count if objectives is None else objectives.critic_weights
+        weights = [1.0] * count if reward_model is None else reward_model.critic_weights
     weights = list(weights)
     if len(weights) != count or min(weights) < 0 or sum(weights) == 0:
         raise ValueError(f"weights: expected {count} of at least 0, not all 0, got {weights}")
@@ -261,5 +279,5 @@ def make_learner(
         config=ppo_config,
         weights=tuple(w / math.fsum(weights) for w in weights),
         total_steps=total_steps,
-        objectives=objectives,
+        reward_model=reward_model,
     )

@@ -13,7 +13,7 @@ import numpy as np
 
 from getup_jax.config import Config
 from getup_jax.envs.composite.build import BuiltComposite, build_composite
-from getup_jax.envs.composite.discriminator_rewards import make_objectives
+from getup_jax.envs.composite.discriminator_rewards import make_discriminator_rewards
 from getup_jax.envs.composite.meta.chain import with_meta
 from getup_jax.envs.composite.meta.meta_policy import MetaTask
 from getup_jax.envs.getup.build import build_task
@@ -54,14 +54,14 @@ def build_job(config: Config, log: Log) -> Job:
     weights = tuple(task.environment.objective_weights.values())
     if config.composite is not None:
         task = styled = with_objectives(config, task, log)
-        objectives, weights = make_objectives(styled.environment, config.composite), None
+        objectives, weights = make_discriminator_rewards(styled.environment, config.composite), None
     learner = make_learner(
         task.environment,
         config.network,
         config.ppo,
         total_steps=config.train.total_steps,
         weights=weights,
-        objectives=objectives,
+        reward_model=objectives,
     )
     carry_over = _carry_over(learner, task.world, config)
     body = body_digest(task.environment.character.model)
@@ -93,7 +93,7 @@ def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Job]:
         config.network,
         config.ppo,
         total_steps=config.train.total_steps,
-        objectives=make_objectives(built.environment, composite),
+        reward_model=make_discriminator_rewards(built.environment, composite),
     )
     prepare = None
     if composite.rehearse:

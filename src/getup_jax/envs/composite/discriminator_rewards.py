@@ -20,7 +20,7 @@ _DRAWN = 2  # folded into a key, so that runs that use all windows draw what the
 
 
 @dataclasses.dataclass(frozen=True)
-class Objectives:
+class DiscriminatorRewards:
     """Names and weights of the objectives, the first of which are imitations [C 4.3]."""
 
     names: tuple[str, ...]  # [K]
@@ -43,7 +43,7 @@ class Objectives:
             for group, key_group in zip(self.groups, keys, strict=False)
         }
 
-    def judge(
+    def score(
         self,
         world: Any,
         states: dict[str, DiscriminatorState],
@@ -87,9 +87,11 @@ class Objectives:
         return jnp.sum(jnp.asarray(self.weights) * rewards, axis=-1, keepdims=True)
 
 
-def make_objectives(env: CompositeTask | StyledGetUp, config: CompositeConfig) -> Objectives:
+def make_discriminator_rewards(
+    env: CompositeTask | StyledGetUp, config: CompositeConfig
+) -> DiscriminatorRewards:
     """The objectives of a composite task, or of getting up with several."""
-    return Objectives(
+    return DiscriminatorRewards(
         names=env.objectives,
         weights=objective_weights(config, env.objectives),
         groups=env.groups,
