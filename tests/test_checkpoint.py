@@ -383,7 +383,7 @@ def test_a_full_disk_costs_nothing_but_the_new_checkpoint(run, monkeypatch, wher
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(f"getup_jax.checkpoint.{where}", fail)
+        patch.setattr(f"getup_jax.runtime.checkpoint.{where}", fail)
         with pytest.raises(CheckpointError, match=r"00000005: could not be saved.*No space left"):
             save(run / "checkpoints", 5)
     assert names(run / "checkpoints") == ["00000003", "00000004"]

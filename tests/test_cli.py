@@ -115,7 +115,7 @@ def test_warnings_are_one_clean_line(calls, capsys, monkeypatch):
 
 EARLY = """
 import sys
-from getup_jax.cli import eval_main, train_main
+from getup_jax.cli.main import eval_main, train_main
 code = train_main(["quick", "ppo.learnig_rate=1"])
 try:
     eval_main(["--start-noise", "-1"])

@@ -114,7 +114,7 @@ def test_over_a_meta_policy_only_the_new_clips_are_learned(built, monkeypatch, t
     monkeypatch.setattr(dagger, "_MINIBATCH", 16)
     monkeypatch.setattr(dagger, "_ROUNDS", 2)
     monkeypatch.setattr(dagger, "_EPOCHS", 150)
-    monkeypatch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
+    monkeypatch.setattr("getup_jax.envs.composite.meta.chain.load_clips", lambda *_: built.clips)
     trained = make_learner(built.environment, CONFIG.network, CONFIG.ppo, total_steps=1000)
     item = {"policy": trained.init_learner(jax.random.PRNGKey(5)).policy, "prior": None}
     meta = str(save_learner(tmp_path / "checkpoints", 1, {"none": np.zeros(1)}, CONFIG, item))

@@ -15,8 +15,8 @@ import pytest
 # As a training does: it says so when it is ready and with every step, and writes what it saves.
 LOOP = """
 import pathlib, sys, time
-from getup_jax.progress import Display
-from getup_jax.stop import StopRequest
+from getup_jax.runtime.console import Display
+from getup_jax.runtime.signals import StopRequest
 with Display(10**6) as display, StopRequest(display.log) as stop:
     with stop.armed():
         display.start(0)

@@ -374,7 +374,7 @@ def test_a_signal_saves_and_says_how_to_resume(tmp_path, unbroken, monkeypatch, 
 
 STOPPED = """
 import os, signal, sys, time
-from getup_jax.stop import StopRequest
+from getup_jax.runtime.signals import StopRequest
 with StopRequest(print) as stop:
     if sys.argv[1] == "armed":
         with stop.armed():

@@ -16,8 +16,8 @@ ROOT = Path(__file__).parent.parent
 CHECK = """
 import pathlib, sys
 import getup_jax
-from getup_jax.paths import asset_path, config_path, shipped_configs
-from getup_jax.settings import load_config
+from getup_jax.core.resources import asset_path, config_path, shipped_configs
+from getup_jax.config.load import load_config
 site = pathlib.Path(sys.argv[1])
 for path in (pathlib.Path(getup_jax.__file__), asset_path(), config_path("flat")):
     assert path.is_relative_to(site) and path.exists(), path

@@ -76,7 +76,7 @@ def test_the_root_is_always_where_it_is(built):
 
 
 def test_a_meta_policy_acts_as_if_the_arm_were_its_own(built, arm, tmp_path, monkeypatch):
-    monkeypatch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
+    monkeypatch.setattr("getup_jax.envs.composite.meta.chain.load_clips", lambda *_: built.clips)
     trained = make_learner(built.environment, CONFIG.network, CONFIG.ppo, total_steps=1000)
     item = {"policy": trained.init_learner(jax.random.PRNGKey(5)).policy, "prior": None}
     meta = str(save_learner(tmp_path / "checkpoints", 1, {"none": np.zeros(1)}, CONFIG, item))

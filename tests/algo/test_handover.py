@@ -59,7 +59,7 @@ def halved(tmp_path_factory):
     composite = dataclasses.replace(COMPOSITE, meta=meta, meta_share=0.5, groups=groups)
     env = dataclasses.replace(built.environment, config=composite)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
+        patch.setattr("getup_jax.envs.composite.meta.chain.load_clips", lambda *_: built.clips)
         return with_meta(
             dataclasses.replace(CONFIG, composite=composite),
             dataclasses.replace(built, environment=env),

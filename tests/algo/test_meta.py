@@ -100,7 +100,7 @@ def test_a_meta_action_reaches_the_pose_that_its_own_policy_would(trained):
     neutral = jnp.asarray(env.character.neutral_qpos[7:], jnp.float32)
     new = dataclasses.replace(built, environment=dataclasses.replace(env, config=config.composite))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
+        patch.setattr("getup_jax.envs.composite.meta.chain.load_clips", lambda *_: built.clips)
         task, meta_world = with_meta(config, new)
     still = dataclasses.replace(task, sample=False)
     action = jax.jit(still.meta_action)(meta_world, [observation], jax.random.key(0))
@@ -119,7 +119,7 @@ def test_a_job_has_the_meta_policy_and_the_rehearsal(trained, monkeypatch, has_m
     env = dataclasses.replace(built.environment, config=composite)
     made = dataclasses.replace(built, environment=env)
     monkeypatch.setattr(run, "build_composite", lambda *_: made)
-    monkeypatch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
+    monkeypatch.setattr("getup_jax.envs.composite.meta.chain.load_clips", lambda *_: built.clips)
     log: list[str] = []
     _, job = run.build_composite_job(config, log.append)
     assert (job.prepare is not None) == rehearse
@@ -134,7 +134,7 @@ def test_hinges_are_new_where_their_clips_are(trained, monkeypatch):
     config = _config(path)
     composite = dataclasses.replace(config.composite, groups=groups)
     env = dataclasses.replace(built.environment, config=composite)
-    monkeypatch.setattr("getup_jax.algo.meta_chain.load_clips", lambda *_: built.clips)
+    monkeypatch.setattr("getup_jax.envs.composite.meta.chain.load_clips", lambda *_: built.clips)
     task, _ = with_meta(
         dataclasses.replace(config, composite=composite),
         dataclasses.replace(built, environment=env),

@@ -29,7 +29,7 @@ BROWSER = [
     pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt install chromium)"),
 ]
 HEIGHT = "Neck height"
-_EDIT = "import sys; from getup_jax.cli import edit_main; sys.exit(edit_main(sys.argv[1:]))"
+_EDIT = "import sys; from getup_jax.cli.main import edit_main; sys.exit(edit_main(sys.argv[1:]))"
 
 
 @contextlib.contextmanager

@@ -93,7 +93,7 @@ def test_a_real_worker_says_what_is_wrong_with_a_file(tmp_path):
 
 CHILD = """
 import sys, time
-from getup_jax.motion.worker import end_with_parent
+from getup_jax.motion.retarget.worker import end_with_parent
 end_with_parent()
 print("ready", flush=True)
 time.sleep(60)
@@ -118,8 +118,8 @@ def test_a_worker_ends_with_the_one_who_started_it():
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not keep the limit")
 def test_a_worker_takes_no_more_memory_than_it_may():
     script = """
-from getup_jax.motion.guard import one_line
-from getup_jax.motion.worker import limit_memory
+from getup_jax.motion.io.guard import one_line
+from getup_jax.motion.retarget.worker import limit_memory
 limit_memory(2_000_000_000)
 with one_line("a.bvh"):
     bytearray(3_000_000_000)

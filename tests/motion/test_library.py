@@ -89,7 +89,9 @@ def test_two_files_of_one_name(character, folder, tmp_path):
 def test_the_second_time_comes_from_the_cache(character, folder, monkeypatch):
     job = Job(folder / "back.bvh", character, ReadOptions(), RetargetSettings())
     (first,) = retarget_files([job], 1)
-    monkeypatch.setattr("getup_jax.motion.cache.run_here", lambda job: pytest.fail("run again"))
+    monkeypatch.setattr(
+        "getup_jax.motion.retarget.cache.run_here", lambda job: pytest.fail("run again")
+    )
     (second,) = retarget_files([job], 1)
     np.testing.assert_allclose(second[0].qpos, first[0].qpos, atol=1e-6)
     assert second[1] == first[1]

@@ -32,7 +32,7 @@ _REWARDS, _DISCRIMINATORS, _STAGGER = 2, 3, 4
 
 
 class RewardModel(Protocol):
-    """Rewards that are learned: trained on every rollout, they score it before values are estimated."""
+    """Rewards that are learned: trained on a rollout, they score it before values are estimated."""
 
     @property
     def critic_weights(self) -> tuple[float, ...]:
