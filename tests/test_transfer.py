@@ -79,6 +79,7 @@ def teacher_of(learner: Learner, policy: PolicyState, units: Units) -> Teacher:
 def quickly(monkeypatch, rounds: int = 1) -> None:
     """Few and small lessons."""
     monkeypatch.setattr(action_distillation, "_ROUNDS", rounds)
+    monkeypatch.setattr(action_distillation, "_SAMPLES", 896)
     monkeypatch.setattr(action_regression, "_EPOCHS", 60)
     monkeypatch.setattr(action_regression, "_MINIBATCH", 64)
 

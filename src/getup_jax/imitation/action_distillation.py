@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from collections.abc import Callable
 
 import jax
@@ -35,8 +36,8 @@ from getup_jax.rl.state import PolicyState
 from getup_jax.runtime.checkpoint import LoadedPolicy
 from getup_jax.runtime.pytree_store import CheckpointError, from_nested
 
-_ROUNDS = 3
-_ROLLOUTS = 8  # of each round; the very last one is held out
+_ROUNDS = 2
+_SAMPLES = 100_000  # at least, of each round; those of its last rollout are held out
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -175,10 +176,11 @@ def carry_over(
     def act(observation: jax.Array) -> jax.Array:
         return lesson(observation).action
 
+    rollouts = 1 + math.ceil(_SAMPLES / (learner.config.num_envs * learner.config.num_steps))
     for number, key_round in enumerate(jax.random.split(key, _ROUNDS)):
         key_roll, key_order = jax.random.split(key_round)
-        part = action_regression.watched(learner, env, world, act, lesson, _ROLLOUTS, key_roll)
-        training, heldout = action_regression.held_out(part, len(part.observation) // _ROLLOUTS)
+        part = action_regression.watched(learner, env, world, act, lesson, rollouts, key_roll)
+        training, heldout = action_regression.held_out(part, len(part.observation) // rollouts)
         seen.append(training)
         if number == 0:
             statistics = _statistics(teacher, env, training.observation)

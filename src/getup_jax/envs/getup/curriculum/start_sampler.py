@@ -35,7 +35,7 @@ def whole_episodes(config: TaskConfig) -> TaskConfig:
         config,
         clip_start=0.0,
         paths=None,
-        start_prioritisation=0.0,
+        focus=0.0,
         short_share=0.0,
         assist=0.0,
         head_grace_s=0.0,
