@@ -25,8 +25,7 @@ from getup_jax.evaluation import getup
 from getup_jax.evaluation.composite import imitation_errors
 from getup_jax.evaluation.composite_rollout import restore, run_composite
 from getup_jax.evaluation.metrics import episode_values
-from getup_jax.evaluation.options import eval_parser
-from getup_jax.evaluation.scenario import Conditions
+from getup_jax.evaluation.scenario import Scenario
 from getup_jax.runtime import checkpoint
 from getup_jax.runtime.console import Display
 from getup_jax.training.run import run
@@ -102,14 +101,11 @@ def guard(
 
 def getup_values(path: str, episodes: int) -> Values:
     """Return rate, success and errors of a get-up policy's episodes."""
-    args = eval_parser().parse_args(["--ckpt", path, "--episodes", str(episodes)])
     loaded = checkpoint.load_policy(path)
-    config = getup.evaluation_config(loaded.config, args)
     with Display(episodes, unit="episodes") as display:
-        conditions = Conditions.of(args)
-        played, _ = getup.evaluate(config, loaded, conditions, episodes, display)
-    control_dt = played.task.environment.engine.control_dt
-    values = episode_values(played.trace, control_dt, config.task.stand_time_s)
+        played, _ = getup.evaluate(loaded, Scenario(episodes=episodes), display)
+    env = played.task.environment
+    values = episode_values(played.trace, env.engine.control_dt, env.config.stand_time_s)
     losses = {name: -values[name] for name in ("height_error_m", "angle_error_rad", "jitter")}
     return {name: values[name] for name in ("return_rate", "success")} | losses
 

@@ -22,8 +22,8 @@ from getup_jax.envs.getup.build import build_task
 from getup_jax.evaluation import control_gain
 from getup_jax.evaluation.control_gain import ControlGain, edit_plan, measure
 from getup_jax.evaluation.getup import Rate, chosen_styles, evaluation_config, restore_policy
-from getup_jax.evaluation.options import eval_parser, natural, output, positive
-from getup_jax.evaluation.scenario import Conditions
+from getup_jax.evaluation.options import natural, output, positive
+from getup_jax.evaluation.scenario import Scenario
 from getup_jax.motion.clips import GetUp
 from getup_jax.pose_prior import prior as pose_prior
 from getup_jax.runtime import checkpoint
@@ -53,14 +53,13 @@ def main() -> None:
 
 def run(args: argparse.Namespace) -> dict[str, ControlGain]:
     """The measure of the policy and, where it is asked for, of the search."""
-    given = ["--ckpt", args.policy, "--seed", str(args.seed)]
-    options = eval_parser().parse_args(given + (["--curves", *args.curves] if args.curves else []))
+    scenario = Scenario(seed=args.seed, curves=tuple(map(str, args.curves or ())))
     loaded = checkpoint.load_policy(args.policy)
-    config = evaluation_config(loaded.config, options)
-    choose = chosen_styles(config, Conditions.of(options))
+    config = evaluation_config(loaded.config, scenario)
+    choose = chosen_styles(config, scenario)
     prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
     task = build_task(config, print, prior, choose)
-    learner, policy = restore_policy(config, loaded, task)
+    learner, policy = restore_policy(loaded, task)
     styles = numbers(args.only, task.getups)
     if args.quick:
         styles, args.edits = styles[:1], 1

@@ -24,7 +24,7 @@ from getup_jax.envs.getup.resets import misfit
 from getup_jax.evaluation.getup import evaluation_config, restore_policy
 from getup_jax.evaluation.motion_quality import FootPoints
 from getup_jax.evaluation.rollout import Roller
-from getup_jax.evaluation.scenario import orientation
+from getup_jax.evaluation.scenario import Scenario, orientation
 from getup_jax.physics.terrain_map import REGIONS
 from getup_jax.pose_prior import prior as pose_prior
 from getup_jax.rl.learner import Learner
@@ -54,17 +54,14 @@ def main() -> None:
     assert startable is not None  # of irregular ground
     styles = np.asarray(startable.styles)[region, : int(startable.count[region])]
     getup, row = np.repeat(styles, args.rows), np.tile(np.arange(args.rows), len(styles))
-    learner, policy = restore_policy(config, loaded, task)
+    learner, policy = restore_policy(loaded, task)
     lasted = _lasted(task, learner, policy, (getup, row, region), args.hand)
     _print(task, getup, row, region, lasted)
 
 
 def _config(config: Config, args: argparse.Namespace) -> Config:
     """That of the evaluation, with the rows that are asked for and the hand's time."""
-    asked = argparse.Namespace(
-        episodes=len(REGIONS) * args.rows * 100, curves=None, engine=None, stand_time=None,
-        start="lying", start_noise=0.0, seed=args.seed, terrain_seed=None, drops=None,
-    )  # fmt: skip
+    asked = Scenario(episodes=len(REGIONS) * args.rows * 100, seed=args.seed)
     config = evaluation_config(config, asked)
     return dataclasses.replace(config, task=dataclasses.replace(config.task, assist_s=args.until))
 

@@ -11,7 +11,7 @@ from tiny_task import CONFIG, tiny_task
 from getup_jax.config import Config, NetworkConfig
 from getup_jax.envs.getup.build import BuiltTask
 from getup_jax.evaluation.rollout import Episodes, run_episodes
-from getup_jax.evaluation.scenario import Conditions, make_plan
+from getup_jax.evaluation.scenario import Scenario, make_plan
 from getup_jax.physics.body_digest import body_digest
 from getup_jax.physics.character import load_character
 from getup_jax.pose_prior.prior import to_dict
@@ -37,7 +37,7 @@ def make_policy(task: BuiltTask, config: Config = SMALL) -> tuple[Learner, Polic
     return learner, learner.init_learner(jax.random.PRNGKey(0)).policy
 
 
-def run(task: BuiltTask, conditions: Conditions, number: int) -> Episodes:
+def run(task: BuiltTask, conditions: Scenario, number: int) -> Episodes:
     learner, policy = make_policy(task)
     *_, styles, rows = task.world.pool.table.shape
     plan = make_plan(conditions, number, styles, rows)

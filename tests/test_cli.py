@@ -137,7 +137,7 @@ def test_a_wrong_setting_is_answered_before_anything_heavy_is_imported():
 def test_eval_passes_its_arguments_on(monkeypatch):
     seen = []
     module = types.SimpleNamespace(evaluate_command=seen.append)
-    monkeypatch.setitem(sys.modules, "getup_jax.evaluation.getup", module)
+    monkeypatch.setitem(sys.modules, "getup_jax.cli.evaluate", module)
     assert cli.eval_main([]) == 0
     options = ["--ckpt", "runs/a", "--episodes", "7", "--seed", "3", "--json", "a.json"]
     assert cli.eval_main([*options, "--video", "a.mp4", "--engine", "mjx"]) == 0
@@ -162,7 +162,7 @@ def test_pictures_need_no_display(monkeypatch):
     # MuJoCo reads the variable when it is imported, so the command has to set it before
     monkeypatch.setattr(os, "environ", {})
     module = types.SimpleNamespace(evaluate_command=lambda _: None)
-    monkeypatch.setitem(sys.modules, "getup_jax.evaluation.getup", module)
+    monkeypatch.setitem(sys.modules, "getup_jax.cli.evaluate", module)
     monkeypatch.setattr(sys, "platform", "linux")
     cli.eval_main([])
     assert os.environ == {}
@@ -172,7 +172,7 @@ def test_pictures_need_no_display(monkeypatch):
 
 def test_a_display_or_a_chosen_renderer_is_kept(monkeypatch):
     module = types.SimpleNamespace(evaluate_command=lambda _: None)
-    monkeypatch.setitem(sys.modules, "getup_jax.evaluation.getup", module)
+    monkeypatch.setitem(sys.modules, "getup_jax.cli.evaluate", module)
     for given in ({"DISPLAY": ":0"}, {"MUJOCO_GL": "osmesa"}):
         monkeypatch.setattr(os, "environ", dict(given))
         cli.eval_main(["--video", "a.mp4"])
@@ -184,7 +184,7 @@ def test_eval_errors_are_clean(monkeypatch, capsys):
         raise ConfigError("physics.engine: expected one of ...")
 
     module = types.SimpleNamespace(evaluate_command=fail)
-    monkeypatch.setitem(sys.modules, "getup_jax.evaluation.getup", module)
+    monkeypatch.setitem(sys.modules, "getup_jax.cli.evaluate", module)
     assert cli.eval_main([]) == 2
     assert capsys.readouterr().err == "ConfigError: physics.engine: expected one of ...\n"
 

@@ -9,7 +9,7 @@ from tiny_task import getups
 from getup_jax.config import Config, ConfigError, PhysicsConfig
 from getup_jax.config.load import load_config
 from getup_jax.envs.getup.resets.pool import angle_gap
-from getup_jax.evaluation.scenario import Conditions, blended, make_plan, of_config, orientation
+from getup_jax.evaluation.scenario import Scenario, blended, make_plan, of_config, orientation
 from getup_jax.motion.clips import Clip, GetUp
 from getup_jax.motion.io.bvh_writer import write_bvh
 from getup_jax.motion.retarget.body import record
@@ -36,7 +36,7 @@ def styles(character) -> list[GetUp]:
 
 
 def test_styles_come_in_turn_each_with_one_start_after_the_other():
-    plan = make_plan(Conditions(), 7, num_styles=2, rows=3)
+    plan = make_plan(Scenario(), 7, num_styles=2, rows=3)
     assert plan.getup.tolist() == [0, 1, 0, 1, 0, 1, 0]
     assert plan.row.tolist() == [0, 0, 1, 1, 2, 2, 0]
     assert (plan.duration_scale == 1.0).all()
@@ -44,7 +44,7 @@ def test_styles_come_in_turn_each_with_one_start_after_the_other():
 
 
 def test_durations_and_pushes_are_random_and_repeat_with_the_seed():
-    conditions = Conditions(duration_scale=(0.8, 1.2), push_ns=20.0, seed=3)
+    conditions = Scenario(duration_scale=(0.8, 1.2), push_ns=20.0, seed=3)
     plan, again = (make_plan(conditions, 2000, 2, 3) for _ in range(2))
     assert 0.8 <= plan.duration_scale.min() < 0.81
     assert 1.19 < plan.duration_scale.max() <= 1.2
@@ -59,16 +59,16 @@ def test_durations_and_pushes_are_random_and_repeat_with_the_seed():
 def test_a_push_needs_a_standing_phase_that_is_long_enough():
     short = load_config(None, ["task.stand_time_s=1.0"])
     with pytest.raises(ConfigError, match=r"--push: .* lasts 1 s; give a longer --stand-time"):
-        Conditions(push_ns=20.0).check(short)
-    Conditions(push_ns=20.0).check(Config())
-    Conditions().check(short)
+        Scenario(push_ns=20.0).check(short)
+    Scenario(push_ns=20.0).check(Config())
+    Scenario().check(short)
 
 
 # Mixtures.
 
 
 def test_half_and_half(styles, character):
-    (mixed,) = blended(styles, character, MATCH_RAD, Conditions(blend="half"))
+    (mixed,) = blended(styles, character, MATCH_RAD, Scenario(blend="half"))
     first, second = styles[:2]
     assert mixed.name == "50% clip + 50% curve"
     assert mixed.duration == pytest.approx((first.duration + second.duration) / 2)
@@ -80,7 +80,7 @@ def test_half_and_half(styles, character):
 def test_random_weights_are_named_and_differ_with_the_seed(styles, character):
     weights = set()
     for seed in range(4):
-        conditions = Conditions(blend="random", seed=seed)
+        conditions = Scenario(blend="random", seed=seed)
         (mixed,) = blended(styles, character, MATCH_RAD, conditions)
         weight = (mixed.duration - styles[1].duration) / (styles[0].duration - styles[1].duration)
         expected = weight * styles[0].points + (1 - weight) * styles[1].points
@@ -94,14 +94,14 @@ def test_random_weights_are_named_and_differ_with_the_seed(styles, character):
 def test_two_curves_alone_start_from_a_motion_like_them(styles, character):
     clip, curve, _ = styles
     other = dataclasses.replace(curve, name="other")
-    mixed = {x.name: x for x in blended([clip, curve, other], character, MATCH_RAD, Conditions())}
+    mixed = {x.name: x for x in blended([clip, curve, other], character, MATCH_RAD, Scenario())}
     assert all(x.clip is clip.clip for x in mixed.values())
     assert len(mixed) == 3
 
 
 def test_curves_that_do_not_start_alike_are_not_mixed(styles, character):
     with pytest.raises(ConfigError, match="--blend: no two of the 2 curves start within"):
-        blended([styles[0], styles[2]], character, MATCH_RAD, Conditions(blend="half"))
+        blended([styles[0], styles[2]], character, MATCH_RAD, Scenario(blend="half"))
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from eval_samples import SMALL, make_policy, make_task, run
 from getup_jax.envs.getup.build import BuiltTask
 from getup_jax.evaluation import rollout
 from getup_jax.evaluation.rollout import CHUNK, Episodes, episode_steps, run_episodes
-from getup_jax.evaluation.scenario import PUSH_AFTER_S, Conditions, make_plan
+from getup_jax.evaluation.scenario import PUSH_AFTER_S, Scenario, make_plan
 
-PUSHED = Conditions(start="standing", push_ns=30.0, duration_scale=(0.8, 1.2))
+PUSHED = Scenario(start="standing", push_ns=30.0, duration_scale=(0.8, 1.2))
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_batches_change_nothing(task, calm, monkeypatch):
 def test_the_last_batch_is_filled_up_and_cut_again(task, monkeypatch):
     monkeypatch.setattr(rollout, "BATCH", 2)
     monkeypatch.setattr(rollout, "CHUNK", 30)
-    assert run(task, Conditions(start="standing"), 3).trace.running.shape[1] == 3
+    assert run(task, Scenario(start="standing"), 3).trace.running.shape[1] == 3
 
 
 def test_one_compile_serves_all_chunks_and_progress_ends_at_all(task, monkeypatch):
@@ -116,8 +116,8 @@ def test_one_compile_serves_all_chunks_and_progress_ends_at_all(task, monkeypatc
 
 
 def test_the_longest_episode(task):
-    lying = make_plan(Conditions(duration_scale=(1.2, 1.2)), 2, 2, 1)
+    lying = make_plan(Scenario(duration_scale=(1.2, 1.2)), 2, 2, 1)
     # the curves last 1 and 2 s
     assert episode_steps(task, lying) == pytest.approx((2.4 + SMALL.task.stand_time_s) * 30, abs=1)
-    standing = make_plan(Conditions(start="standing"), 2, 2, 1)
+    standing = make_plan(Scenario(start="standing"), 2, 2, 1)
     assert episode_steps(task, standing) == pytest.approx(SMALL.task.stand_time_s * 30, abs=1)

@@ -9,12 +9,12 @@ from eval_samples import make_task, run
 from getup_jax.config import ConfigError
 from getup_jax.evaluation import film, plot
 from getup_jax.evaluation.rollout import Episodes
-from getup_jax.evaluation.scenario import Conditions
+from getup_jax.evaluation.scenario import Scenario
 
 
 @pytest.fixture(scope="module")
 def episodes() -> Episodes:
-    return run(make_task(), Conditions(start="standing"), 3)
+    return run(make_task(), Scenario(start="standing"), 3)
 
 
 def test_the_band_is_over_the_episodes_that_run():

@@ -8,9 +8,10 @@ from tiny_task import tiny_task
 
 from eval_samples import SMALL, make_task, save_policy
 from getup_jax.cli import main
+from getup_jax.cli.evaluate import to_scenario
 from getup_jax.config.load import load_config
 from getup_jax.evaluation import getup
-from getup_jax.evaluation.scenario import Conditions
+from getup_jax.evaluation.scenario import Scenario
 from getup_jax.physics.character import load_character
 from getup_jax.release import export
 from getup_jax.release.export import CARD
@@ -82,16 +83,20 @@ def test_edits_of_a_standing_start_are_refused(run_folder, capsys):
     assert capsys.readouterr().err.startswith("ConfigError: --edits: are of the rise")
 
 
+def asked(*options: str) -> Scenario:
+    """What these options of getup-eval mean."""
+    return to_scenario(main.eval_parser().parse_args(options))
+
+
 def test_the_config_of_an_evaluation_takes_its_starts_from_the_arguments():
     config = load_config(None, ["task.start_noise_rad=0.3", "task.clip_start=0.3"])
-    args = main.eval_parser().parse_args(["--episodes", "7", "--seed", "5"])
-    task = getup.evaluation_config(config, args).task
+    task = getup.evaluation_config(config, asked("--episodes", "7", "--seed", "5")).task
     assert (task.start_noise_rad, task.clip_start, task.stand_start) == (0.0, 0.0, 0.0)
     assert (task.pool_size, task.stand_time_s) == (7, config.task.stand_time_s)
-    args = main.eval_parser().parse_args(["--start", "standing", "--start-noise", "0.1"])
-    task = getup.evaluation_config(config, args).task
+    standing = asked("--start", "standing", "--start-noise", "0.1")
+    task = getup.evaluation_config(config, standing).task
     assert (task.stand_start, task.start_noise_rad) == (1.0, 0.1)
-    assert Conditions.of(args).kind == 1
+    assert standing.kind == 1
 
 
 def test_bodies_are_dropped_as_asked_and_not_those_of_the_training():
@@ -99,7 +104,7 @@ def test_bodies_are_dropped_as_asked_and_not_those_of_the_training():
     config = load_config(None, settings)
 
     def task(*options: str, config=config):
-        return getup.evaluation_config(config, main.eval_parser().parse_args(options)).task
+        return getup.evaluation_config(config, asked(*options)).task
 
     plain = task()
     assert (plain.limp_share, plain.fallen_share, plain.drop_as) == (0.0, 0.0, "limp")

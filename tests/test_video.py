@@ -12,14 +12,14 @@ from eval_samples import make_task, run
 from getup_jax.config import ConfigError
 from getup_jax.evaluation import film
 from getup_jax.evaluation.rollout import Episodes
-from getup_jax.evaluation.scenario import Conditions
+from getup_jax.evaluation.scenario import Scenario
 from getup_jax.motion.clips import GetUp
 
 
 @pytest.fixture(scope="module")
 def episodes() -> Episodes:
     """Standing starts of two styles, two episodes each."""
-    return run(make_task(), Conditions(start="standing"), 4)
+    return run(make_task(), Scenario(start="standing"), 4)
 
 
 def with_success(episodes: Episodes, success: list[bool], reward: list[float]) -> Episodes:

@@ -18,7 +18,7 @@ from getup_jax.envs.getup.build import assemble
 from getup_jax.envs.getup.resets import region_pool
 from getup_jax.evaluation.metrics import episode_values
 from getup_jax.evaluation.rollout import CHUNK, run_episodes
-from getup_jax.evaluation.scenario import Conditions, drawn, make_plan
+from getup_jax.evaluation.scenario import Scenario, drawn, make_plan
 from getup_jax.motion.clips import MotionError
 from getup_jax.physics.character import load_character
 
@@ -44,7 +44,7 @@ def test_it_is_what_an_evaluation_of_the_curve_file_does_to_the_last_bit(simulat
     task = assemble(config, character, styles, neutral_prior(character), lambda text: None)
     learner, policy = make_policy(task, config)
     *_, rows = task.world.pool.table.shape
-    plan = make_plan(Conditions(), 1, len(styles), rows)
+    plan = make_plan(Scenario(), 1, len(styles), rows)
     trace = run_episodes(task, learner, policy, plan, lambda done: None).trace
     motion, steps = simulator.finish(curve), int(trace.running.sum())
     assert steps == motion.frames.running.sum() >= CHUNK - 1

@@ -78,7 +78,7 @@ def _train(args: argparse.Namespace) -> int:
 def _evaluate(args: argparse.Namespace) -> int:
     if args.video is not None or args.plot is not None:
         _render_without_display()
-    from getup_jax.evaluation.getup import evaluate_command
+    from getup_jax.cli.evaluate import evaluate_command
 
     return evaluate_command(args) or 0
 

@@ -20,8 +20,8 @@ from getup_jax.envs.getup.episode import LYING
 from getup_jax.evaluation.getup import evaluation_config, restore_policy
 from getup_jax.evaluation.metrics import episode_values
 from getup_jax.evaluation.motion_quality import FootPoints
-from getup_jax.evaluation.options import eval_parser
 from getup_jax.evaluation.rollout import CHUNK, Roller, Trace
+from getup_jax.evaluation.scenario import Scenario
 from getup_jax.motion.clips import GetUp
 from getup_jax.motion.io.curve_file import CurveFile
 from getup_jax.physics.body_digest import body_digest, warn_if_other
@@ -85,7 +85,7 @@ class Simulator:
     @classmethod
     def of(cls, config: Config, task: BuiltTask, loaded: LoadedPolicy) -> Simulator:
         """The simulator of a finished task."""
-        learner, policy = restore_policy(config, loaded, task)
+        learner, policy = restore_policy(loaded, task)
         env = task.environment
         roller = Roller(env, learner, LYING, FootPoints.of(env.character))
         options = env.engine.compiler_options
@@ -175,8 +175,7 @@ class Simulator:
 
 def editor_config(config: Config) -> Config:
     """The config of an evaluation with the defaults of getup-eval, for one episode at a time."""
-    args = eval_parser().parse_args(["--episodes", "1"])
-    config = evaluation_config(config, args)
+    config = evaluation_config(config, Scenario(episodes=1))
     # the pose prior comes with the checkpoint: nothing needs many poses
     config = dataclasses.replace(config, motion=dataclasses.replace(config.motion, augment_poses=1))
     if config.terrain is None:

@@ -1,14 +1,11 @@
-"""`getup-eval`: run a trained policy without noise, once an episode, and score it."""
+"""Runs a trained policy without noise, once an episode, and scores it."""
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import functools
-import json
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -20,23 +17,19 @@ from getup_jax.envs.getup.curriculum.start_sampler import whole_episodes
 from getup_jax.envs.getup.episode import LAST_S, STAND_LOWEST, STAND_MEAN
 from getup_jax.envs.getup.resets.rag_doll import DROPS
 from getup_jax.evaluation import control_gain
-from getup_jax.evaluation import film as video
-from getup_jax.evaluation import plot as eval_plot
-from getup_jax.evaluation.composite import evaluate_composite
 from getup_jax.evaluation.control_gain import ControlGain
 from getup_jax.evaluation.ground_kinds import Places
-from getup_jax.evaluation.metrics import Scores, score, to_json
+from getup_jax.evaluation.metrics import Scores, score
 from getup_jax.evaluation.rollout import Episodes, run_episodes
 from getup_jax.evaluation.scenario import (
     DROPPED,
-    Conditions,
     Plan,
+    Scenario,
     blended,
     drawn,
     make_plan,
     of_config,
 )
-from getup_jax.evaluation.table import table
 from getup_jax.motion.clips import GetUp
 from getup_jax.motion.io.curve_file import read_curve_file
 from getup_jax.physics.body_digest import body_digest, warn_if_other
@@ -45,7 +38,6 @@ from getup_jax.physics.terrain_map import REGIONS
 from getup_jax.pose_prior import prior as pose_prior
 from getup_jax.rl.learner import Learner, make_learner
 from getup_jax.rl.state import PolicyState
-from getup_jax.runtime import checkpoint
 from getup_jax.runtime.checkpoint import LoadedPolicy
 from getup_jax.runtime.console import Display
 from getup_jax.runtime.pytree_store import from_nested
@@ -56,53 +48,19 @@ _DROPS, _FLAT_DROPS = 1500, 500  # bodies that fall on irregular ground, and on 
 Choice = Callable[[tuple[GetUp, ...], CharacterSpec], tuple[GetUp, ...]]
 
 
-def evaluate_command(args: argparse.Namespace) -> int:
-    """The command line of `getup-eval`; returns the exit code."""
-    begin = time.monotonic()
-    if args.video is not None:
-        video.require()
-    if args.plot is not None:
-        eval_plot.require()
-    loaded = checkpoint.load_policy(args.ckpt)
-    if loaded.config.composite_motion:
-        return evaluate_composite(args, loaded)
-    if args.script is not None:
-        raise ConfigError("--script: only for policies of composite motion")
-    conditions = Conditions.of(args)
-    config = evaluation_config(loaded.config, args)
-    conditions.check(config)
-    number = episode_count(loaded.config, args)
-    with Display(number, unit="episodes") as display:
-        display.log(f"{loaded.path}: {loaded.metadata.get('steps', 0):,} steps of training")
-        episodes, scores = evaluate(config, loaded, conditions, number, display)
-    control = None
-    if conditions.edits:
-        control = evaluate_edits(config, loaded, episodes.task, conditions)
-    print(table(scores))
-    if control is not None:
-        print(control_gain.table({args.ckpt: control}))
-    print(f"{number} episodes in {time.monotonic() - begin:.0f} s")
-    if args.json is not None:
-        facts = description(config, loaded, conditions, episodes)
-        if control is not None:
-            facts["control_gain"] = control_gain.to_json(control)
-            facts["success_edits"] = control.success
-        args.json.write_text(json.dumps({**to_json(scores), **facts}, indent=2) + "\n")
-    _write_pictures(args.video, args.plot, episodes)
-    return 0
-
-
-def evaluate(
-    config: Config, loaded: LoadedPolicy, conditions: Conditions, number: int, display: Display
-) -> tuple[Episodes, Scores]:
-    """Run and score the episodes; `config` is that of `evaluation_config`."""
+def evaluate(loaded: LoadedPolicy, scenario: Scenario, display: Display) -> tuple[Episodes, Scores]:
+    """Run and score the episodes; raises ConfigError where the policy cannot be asked that."""
+    config, number = (
+        evaluation_config(loaded.config, scenario),
+        episode_count(loaded.config, scenario),
+    )
     prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
-    task = build_task(config, display.log, prior, chosen_styles(config, conditions))
+    task = build_task(config, display.log, prior, chosen_styles(config, scenario))
     body = body_digest(task.environment.character.model)
     warn_if_other(loaded.path, loaded.metadata, body, display.log)
-    learner, policy = restore_policy(config, loaded, task)
+    learner, policy = restore_policy(loaded, task)
     *_, num_styles, rows = task.world.pool.table.shape
-    plan = make_plan(conditions, number, num_styles, rows)
+    plan = make_plan(scenario, number, num_styles, rows)
     if task.world.pool.startable is not None:
         plan = plan.on_regions(task.world.pool)
     display.log("compiling the episode ...")
@@ -114,7 +72,7 @@ def evaluate(
         task.getups,
         control_dt,
         config.task.stand_time_s,
-        conditions.kind,
+        scenario.kind,
         _places(config, task, plan),
     )
     return episodes, scores
@@ -130,40 +88,40 @@ def _places(config: Config, task: BuiltTask, plan: Plan) -> Places | None:
     return Places.of(plan.region, xy, config.terrain)
 
 
-def evaluate_edits(
-    config: Config, loaded: LoadedPolicy, task: BuiltTask, conditions: Conditions
-) -> ControlGain:
+def evaluate_edits(loaded: LoadedPolicy, task: BuiltTask, scenario: Scenario) -> ControlGain:
     """How well the policy obeys edits of the task's curves; see `evaluation/control_gain.py`."""
-    learner, policy = restore_policy(config, loaded, task)
-    plan = control_gain.edit_plan(task, conditions.edits, conditions.seed)
+    learner, policy = restore_policy(loaded, task)
+    plan = control_gain.edit_plan(task, scenario.edits, scenario.seed)
     number = len(plan.getup)
     with Display(number, unit="episodes") as display:
-        display.log(f"{conditions.edits} edits of each curve ...")
+        display.log(f"{scenario.edits} edits of each curve ...")
         return control_gain.measure(task, learner, policy, plan, Rate(display, number))
 
 
-def evaluation_config(config: Config, args: argparse.Namespace) -> Config:
+def evaluation_config(config: Config, scenario: Scenario) -> Config:
     """The training config with the starts that are asked for, as many as there are episodes.
 
-    Start noise is that of the arguments and the early-end rule is the default one, that of the
+    Start noise is that of the scenario and the early-end rule is the default one, that of the
     paper, not those of the training, so that two policies meet the same starts and the same rule.
     """
     physics, task = config.physics, config.task
-    if args.engine is not None:
+    if scenario.engine is not None:
         solver = "auto" if physics.solver == "pgs" else physics.solver  # MJX has no PGS
-        physics = dataclasses.replace(physics, engine=args.engine, solver=solver)
-    stand_time_s = task.stand_time_s if args.stand_time is None else args.stand_time
+        physics = dataclasses.replace(physics, engine=scenario.engine, solver=solver)
+    stand_time_s = task.stand_time_s if scenario.stand_time_s is None else scenario.stand_time_s
     task = dataclasses.replace(
         whole_episodes(task),
-        stand_start=float(args.start == "standing"),
-        start_noise_rad=args.start_noise,
+        stand_start=float(scenario.start == "standing"),
+        start_noise_rad=scenario.start_noise_rad,
         terminate_reward=TaskConfig.terminate_reward,
-        pool_size=episode_count(config, args),
+        pool_size=episode_count(config, scenario),
         stand_time_s=stand_time_s,
-        **_dropped(task, args.drops),
+        **_dropped(task, scenario.drops),
     )
-    terrain = _evaluation_terrain(config.terrain, args.terrain_seed)
-    return dataclasses.replace(config, physics=physics, task=task, terrain=terrain, seed=args.seed)
+    terrain = _evaluation_terrain(config.terrain, scenario.terrain_seed)
+    return dataclasses.replace(
+        config, physics=physics, task=task, terrain=terrain, seed=scenario.seed
+    )
 
 
 def _dropped(task: TaskConfig, drops: str | None) -> dict[str, Any]:
@@ -174,11 +132,11 @@ def _dropped(task: TaskConfig, drops: str | None) -> dict[str, Any]:
     return {"limp_share": 1.0, "limp_drops": count, **DROPPED[drops]}
 
 
-def episode_count(config: Config, args: argparse.Namespace) -> int:
+def episode_count(config: Config, scenario: Scenario) -> int:
     """How many episodes: as many as asked for, or the default for the ground."""
     regions = 1 if config.terrain is None else len(REGIONS)
-    curves = sum(len(read_curve_file(path).durations) for path in args.curves or ())
-    return args.episodes or (curves or _EPISODES) * regions
+    curves = sum(len(read_curve_file(path).durations) for path in scenario.curves)
+    return scenario.episodes or (curves or _EPISODES) * regions
 
 
 def _evaluation_terrain(terrain: TerrainConfig | None, seed: int | None) -> TerrainConfig | None:
@@ -192,20 +150,19 @@ def _evaluation_terrain(terrain: TerrainConfig | None, seed: int | None) -> Terr
     return dataclasses.replace(terrain, seed=own, drops=_DROPS - (terrain.drops == _DROPS))
 
 
-def description(
-    config: Config, loaded: LoadedPolicy, conditions: Conditions, episodes: Episodes
-) -> dict[str, Any]:
-    """What the JSON file says beside the scores: the policy, the conditions and the rules."""
-    task = config.task
+def description(loaded: LoadedPolicy, scenario: Scenario, episodes: Episodes) -> dict[str, Any]:
+    """What the JSON file says beside the scores: the policy, the scenario and the rules."""
+    env = episodes.task.environment
+    task, terrain = env.config, env.terrain
     return {
         "policy": {"path": str(loaded.path), "seed": loaded.config.seed, **loaded.metadata},
         "conditions": {
-            **dataclasses.asdict(conditions),
-            "stand_time_s": config.task.stand_time_s,
-            "engine": episodes.task.environment.engine.name,
-            "terrain_seed": None if config.terrain is None else config.terrain.seed,
+            **dataclasses.asdict(scenario),
+            "stand_time_s": task.stand_time_s,
+            "engine": env.engine.name,
+            "terrain_seed": None if terrain is None else terrain.seed,
             "pushed_episodes": int(episodes.trace.pushed.any(axis=0).sum()),
-            "drop": None if conditions.drops is None else _drop(task),
+            "drop": None if scenario.drops is None else _drop(task),
         },
         "rules": {
             "success": {
@@ -249,37 +206,27 @@ class Rate:
             self._shown = part
 
 
-def chosen_styles(config: Config, conditions: Conditions) -> Choice | None:
+def chosen_styles(config: Config, scenario: Scenario) -> Choice | None:
     """What makes the styles out of those of the training; None: they are the same."""
-    if conditions.curves:
-        files = [read_curve_file(path) for path in conditions.curves]
+    if scenario.curves:
+        files = [read_curve_file(path) for path in scenario.curves]
         return functools.partial(drawn, files)
-    if conditions.motions is not None:
-        return functools.partial(of_config, conditions.motions)
-    if not conditions.blend:
+    if scenario.motions is not None:
+        return functools.partial(of_config, scenario.motions)
+    if not scenario.blend:
         return None
 
     def mixtures(getups: Sequence[GetUp], character: CharacterSpec) -> tuple[GetUp, ...]:
-        return blended(getups, character, config.task.curve_match_rad, conditions)
+        return blended(getups, character, config.task.curve_match_rad, scenario)
 
     return mixtures
 
 
-def restore_policy(
-    config: Config, loaded: LoadedPolicy, task: BuiltTask
-) -> tuple[Learner, PolicyState]:
+def restore_policy(loaded: LoadedPolicy, task: BuiltTask) -> tuple[Learner, PolicyState]:
     """The learner of a task and the loaded policy in its form."""
+    config = loaded.config
     learner = make_learner(
         task.environment, config.network, config.ppo, total_steps=config.train.total_steps
     )
     template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0)).policy
     return learner, from_nested(template, loaded.policy, str(loaded.path))
-
-
-def _write_pictures(film: Path | None, plot: Path | None, episodes: Episodes) -> None:
-    if plot is not None:
-        eval_plot.plot(plot, episodes)
-        print(f"plot: {plot}")
-    if film is not None:
-        video.film(film, episodes)
-        print(f"video: {film}")

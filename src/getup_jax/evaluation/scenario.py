@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import itertools
 from collections.abc import Sequence
@@ -33,9 +32,10 @@ PUSH_AFTER_S = 1.0  # a push comes at the first chance this long after the curve
 
 
 @dataclasses.dataclass(frozen=True)
-class Conditions:
+class Scenario:
     """How the episodes of one evaluation begin and what happens to them."""
 
+    episodes: int | None = None  # None: 100, on irregular ground in each region; one a drawn curve
     start: str = "lying"  # lying | standing
     start_noise_rad: float = 0.0  # standard deviation on every hinge of the start poses
     duration_scale: tuple[float, float] = (1.0, 1.0)  # each episode's T is multiplied by U(a, b)
@@ -45,25 +45,11 @@ class Conditions:
     seed: int = 0
     curves: tuple[str, ...] = ()  # curve files in place of the trained styles
     motions: str | None = None  # a config or motion file in place of the trained styles
-    drops: str | None = (
-        None  # how bodies came to lie, see DROPPED; None: as in training without limp_share
-    )
-
-    @classmethod
-    def of(cls, args: argparse.Namespace) -> Conditions:
-        """Those that `getup-eval` was asked for."""
-        return cls(
-            start=args.start,
-            start_noise_rad=args.start_noise,
-            duration_scale=args.duration_scale,
-            blend=args.blend,
-            push_ns=args.push,
-            edits=args.edits or 0,
-            seed=args.seed,
-            curves=tuple(map(str, args.curves or ())),
-            motions=None if args.motions is None else str(args.motions),
-            drops=args.drops,
-        )
+    # how bodies came to lie, see DROPPED; None: as in training without limp_share
+    drops: str | None = None
+    stand_time_s: float | None = None  # to stand after the curve's end; None: as in training
+    terrain_seed: int | None = None  # of the irregular ground; None: that of the training
+    engine: str | None = None  # native | mjx; None: as in training
 
     @property
     def kind(self) -> int:
@@ -102,23 +88,23 @@ class Plan:
         return dataclasses.replace(self, getup=getup, row=row, region=region)
 
 
-def make_plan(conditions: Conditions, episodes: int, num_styles: int, rows: int) -> Plan:
+def make_plan(scenario: Scenario, episodes: int, num_styles: int, rows: int) -> Plan:
     """The styles in turn, each with one start of the pool after the other."""
-    rng = np.random.default_rng(conditions.seed)
+    rng = np.random.default_rng(scenario.seed)
     number = np.arange(episodes)
     angle = rng.uniform(-np.pi, np.pi, episodes)
     direction = np.stack([np.cos(angle), np.sin(angle), np.zeros(episodes)], axis=-1)
     return Plan(
-        kind=conditions.kind,
+        kind=scenario.kind,
         getup=(number % num_styles).astype(np.int32),
         row=(number // num_styles % rows).astype(np.int32),
-        duration_scale=rng.uniform(*conditions.duration_scale, episodes).astype(np.float32),
-        impulse=(conditions.push_ns or 0.0) * direction,
+        duration_scale=rng.uniform(*scenario.duration_scale, episodes).astype(np.float32),
+        impulse=(scenario.push_ns or 0.0) * direction,
     )
 
 
 def blended(
-    getups: Sequence[GetUp], character: CharacterSpec, match_rad: float, conditions: Conditions
+    getups: Sequence[GetUp], character: CharacterSpec, match_rad: float, scenario: Scenario
 ) -> tuple[GetUp, ...]:
     """Mixtures of every two curves that start alike, in random order.
 
@@ -127,12 +113,12 @@ def blended(
     alone: the one whose torso angles are nearest to its first ones. Two curves start alike
     where these angles differ by at most match_rad, which also holds for pose and mixture.
     """
-    rng = np.random.default_rng(conditions.seed)
+    rng = np.random.default_rng(scenario.seed)
     pairs = list(itertools.combinations(getups, 2))
     styles = []
     for i in rng.permutation(len(pairs)):
         first, second = pairs[i]
-        weight = 0.5 if conditions.blend == "half" else float(rng.uniform())
+        weight = 0.5 if scenario.blend == "half" else float(rng.uniform())
         if np.abs(first.points[0, 1:] - second.points[0, 1:]).max() <= match_rad:
             mixed = _with_start(_mix(first, second, weight), (first, second), getups, character)
             if (
