@@ -12,7 +12,7 @@ import getup_jax
 
 PACKAGE = Path(getup_jax.__file__).parent
 
-# From left to right; a name is a sub-package of getup_jax.
+# From left to right; a name is a sub-package of getup_jax, or a file of it.
 LAYERS = [
     ["core"],
     ["config"],
@@ -23,7 +23,7 @@ LAYERS = [
     ["imitation"],
     ["training"],
     ["evaluation"],
-    ["release", "trajectory_search", "editor"],
+    ["release", "trajectory_search", "editor", "api.py"],
     ["cli"],
 ]
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}

@@ -99,8 +99,15 @@ class StepOutput:
     terminated: jax.Array  # [B] bool, failure: no value beyond this step
     truncated: jax.Array  # [B] bool, time limit: the final observation's value bootstraps
     metrics: dict[str, jax.Array]  # name -> [B], averaged over all steps
-    episode: dict[str, jax.Array]  # name -> [B], averaged where an episode ended and not NaN
+    # name -> [B], verdicts on the episodes that are `done`: averaged over those and not NaN; NaN
+    # says that the name means nothing for such an episode; elsewhere they say nothing
+    episode: dict[str, jax.Array]
     extras: Any = None  # pytree [B, ...] that a learner stage needs (discriminator windows)
+
+    @property
+    def done(self) -> jax.Array:
+        """[B] bool, where an episode ended in this step, and another one has begun."""
+        return self.terminated | self.truncated
 
 
 class Environment(Protocol):

@@ -50,10 +50,8 @@ Choice = Callable[[tuple[GetUp, ...], CharacterSpec], tuple[GetUp, ...]]
 
 def evaluate(loaded: LoadedPolicy, scenario: Scenario, display: Display) -> tuple[Episodes, Scores]:
     """Run and score the episodes; raises ConfigError where the policy cannot be asked that."""
-    config, number = (
-        evaluation_config(loaded.config, scenario),
-        episode_count(loaded.config, scenario),
-    )
+    config = evaluation_config(loaded.config, scenario)
+    number = episode_count(loaded.config, scenario)
     prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
     task = build_task(config, display.log, prior, chosen_styles(config, scenario))
     body = body_digest(task.environment.character.model)
@@ -119,9 +117,11 @@ def evaluation_config(config: Config, scenario: Scenario) -> Config:
         **_dropped(task, scenario.drops),
     )
     terrain = _evaluation_terrain(config.terrain, scenario.terrain_seed)
-    return dataclasses.replace(
+    config = dataclasses.replace(
         config, physics=physics, task=task, terrain=terrain, seed=scenario.seed
     )
+    scenario.check(config)
+    return config
 
 
 def _dropped(task: TaskConfig, drops: str | None) -> dict[str, Any]:

@@ -122,7 +122,7 @@ class GetUpTask:
                 return begun  # episodes are cut short, or none is
             return begun.replace(until=jnp.full_like(begun.time, jnp.inf))  # only first ones are
 
-        done = output.terminated | output.truncated
+        done = output.done
         # what belongs to the whole batch has no simulation axis and stays out of the rows
         rows = after.replace(key=None, focus=None, assist=None, curriculum=None)
         after = replace_rows(rows, done, fresh, _RESET_CHUNK)

@@ -1,0 +1,213 @@
+"""The front door in Python: policies, environments, training and evaluation by name.
+
+    import getup_jax as gj
+
+    policy = gj.load_policy("flat")
+    env = gj.make_env(policy, num_envs=64)
+    state = env.reset(seed=0)
+    for _ in range(300):
+        state, output = env.step(state, policy.act(state.observation))
+
+See docs/python.md. Everything here is also in the rooms below, in parts that can be put together in
+other ways.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jax
+
+from getup_jax.config import Config, ConfigError
+from getup_jax.config.load import load_config as _load_config
+from getup_jax.core.types import StepOutput
+from getup_jax.envs.getup.build import build_task
+from getup_jax.evaluation import composite_rollout, getup
+from getup_jax.evaluation.metrics import Scores
+from getup_jax.evaluation.scenario import Scenario
+from getup_jax.pose_prior import prior as pose_prior
+from getup_jax.pose_prior.prior import PosePrior
+from getup_jax.runtime import checkpoint
+from getup_jax.runtime.console import Display
+from getup_jax.training import run as _run
+
+Log = Callable[[str], None]
+
+
+def _silent(text: str) -> None:
+    """Say nothing."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Policy:
+    """A trained policy, without noise."""
+
+    config: Config  # that it was trained with
+    loaded: checkpoint.LoadedPolicy
+
+    @property
+    def name(self) -> str:
+        """Where it was loaded from."""
+        return str(self.loaded.path)
+
+    @property
+    def steps(self) -> int:
+        """Control steps of its training."""
+        return int(self.loaded.metadata.get("steps", 0))
+
+    def act(self, observation: jax.Array) -> jax.Array:
+        """Mean actions [N, A] for raw observations [N, O]."""
+        return self._act(observation)
+
+    @functools.cached_property
+    def _act(self) -> Callable[[jax.Array], jax.Array]:
+        if self.config.composite_motion:
+            found = composite_rollout.restore(self.config, self.loaded, _silent)
+            return jax.jit(functools.partial(found.job.learner.act, found.policy))
+        config = getup.evaluation_config(self.config, Scenario(episodes=1))
+        task = build_task(config, _silent, self.prior)
+        learner, policy = getup.restore_policy(self.loaded, task)
+        return jax.jit(functools.partial(learner.act, policy))
+
+    @property
+    def prior(self) -> PosePrior | None:
+        """What its latent actions mean; None: they are servo targets."""
+        stored = self.loaded.prior
+        return None if stored is None else pose_prior.from_dict(stored)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Env:
+    """A batch of episodes that start anew by themselves; its steps are compiled once."""
+
+    config: Config
+    num_envs: int
+    environment: Any  # pure functions of the world and the state, see core/types.py
+    world: Any  # the arrays that all episodes share
+    styles: tuple[str, ...]  # the get-ups that it follows, in the order of `state.getup`
+
+    @property
+    def observation_size(self) -> int:
+        """O."""
+        return int(self.environment.observation_size)
+
+    @property
+    def action_size(self) -> int:
+        """A."""
+        return int(self.environment.action_size)
+
+    @property
+    def control_dt(self) -> float:
+        """Seconds of a step."""
+        return float(self.environment.engine.control_dt)
+
+    def reset(self, seed: int = 0) -> Any:
+        """The first state of all episodes; `state.observation` is [num_envs, O]."""
+        return self._reset(self.world, jax.random.PRNGKey(seed))
+
+    def step(self, state: Any, action: jax.Array) -> tuple[Any, StepOutput]:
+        """The next state after actions [num_envs, A], and what came of it; see `StepOutput`."""
+        return self._step(self.world, state, action)
+
+    @functools.cached_property
+    def _reset(self) -> Callable[[Any, jax.Array], Any]:
+        return jax.jit(lambda world, key: self.environment.init(world, key, self.num_envs))
+
+    @functools.cached_property
+    def _step(self) -> Callable[[Any, Any, jax.Array], tuple[Any, StepOutput]]:
+        return jax.jit(self.environment.step)
+
+
+def load_config(source: str | Path, *overrides: str) -> Config:
+    """The config of a YAML file or of a shipped name, with `section.key=value` overrides.
+
+    Raises ConfigError that says what is wrong, in one line.
+    """
+    return _load_config(source, overrides)
+
+
+def load_policy(source: str | Path = "flat") -> Policy:
+    """The policy of a run folder, a checkpoint, an exported policy, or the name of a shipped one.
+
+    Raises CheckpointError that says what is wrong, in one line.
+    """
+    loaded = checkpoint.load_policy(source)
+    return Policy(loaded.config, loaded)
+
+
+def make_env(
+    source: Policy | Config | str | Path,
+    num_envs: int = 1,
+    scenario: Scenario | None = None,
+    training: bool = False,
+    log: Log = _silent,
+) -> Env:
+    """Episodes of a policy's or a config's task.
+
+    Args:
+        source: a policy, whose pose prior the actions are then in; a config, or the name of one.
+        num_envs: how many episodes go on at once.
+        scenario: how episodes begin; by default as `getup-eval` has them: whole ones, lying.
+        training: episodes as a training has them, with starts on the way, ends that come early and
+            help; not with a scenario.
+        log: gets a line for each step of building it.
+
+    Raises ConfigError for what is not possible.
+    """
+    if num_envs < 1:
+        raise ConfigError(f"num_envs: expected at least 1, got {num_envs}")
+    if training and scenario is not None:
+        raise ConfigError("make_env: expected a scenario or training=True, got both")
+    policy = source if isinstance(source, Policy) else None
+    if isinstance(source, Policy | Config):
+        config = source.config if isinstance(source, Policy) else source
+    else:
+        config = load_config(source)
+    if config.composite_motion:
+        if scenario is not None:
+            raise ConfigError("scenario: only for getting up, this config is of composite motion")
+        job = _run.build_composite_job(config, log)[1]
+        return Env(config, num_envs, job.learner.env, job.world, ())
+    prior = None if policy is None else policy.prior
+    if not training:
+        config = getup.evaluation_config(config, scenario or Scenario())
+    built = build_task(config, log, prior, getup.chosen_styles(config, scenario or Scenario()))
+    styles = tuple(style.name for style in built.getups)
+    return Env(config, num_envs, built.environment, built.world, styles)
+
+
+def train(
+    config: Config, run_folder: str | Path, resume: bool = False, quiet: bool = False
+) -> Policy:
+    """Train until `train.total_steps`, and give the policy; Ctrl-C saves and gives what is there.
+
+    Args:
+        config: of `load_config`.
+        run_folder: gets config.yaml, metrics.jsonl and checkpoints/.
+        resume: go on from the folder's newest checkpoint, where it has one.
+        quiet: print nothing.
+
+    Raises RunError, CheckpointError and TrainingError with texts for the user.
+    """
+    _run.run(config, run_folder, resume=resume, quiet=quiet)
+    return load_policy(run_folder)
+
+
+def evaluate(
+    policy: Policy | str | Path, scenario: Scenario | None = None, quiet: bool = True
+) -> Scores:
+    """What `getup-eval` says about a policy that gets up: success, errors, how the motion feels.
+
+    Raises ConfigError for what it cannot be asked.
+    """
+    policy = policy if isinstance(policy, Policy) else load_policy(policy)
+    if policy.config.composite_motion:
+        raise ConfigError(f"{policy.name}: is of composite motion; use getup-eval --ckpt")
+    scenario = scenario or Scenario()
+    number = getup.episode_count(policy.config, scenario)
+    with Display(number, quiet, unit="episodes") as display:
+        return getup.evaluate(policy.loaded, scenario, display)[1]

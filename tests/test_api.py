@@ -1,0 +1,72 @@
+"""The front door, as docs/python.md shows it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import getup_jax as gj
+from getup_jax.config import ConfigError
+from getup_jax.runtime.pytree_store import CheckpointError
+
+
+@pytest.fixture(scope="module")
+def policy() -> gj.Policy:
+    return gj.load_policy("flat")
+
+
+def test_a_shipped_policy_gets_up_in_whole_episodes(policy):
+    env = gj.make_env(policy, num_envs=28)
+    assert len(env.styles) == 28
+    state = env.reset(seed=0)
+    assert state.observation.shape == (28, env.observation_size)
+    assert policy.act(state.observation).shape == (28, env.action_size)
+    verdicts: list[np.ndarray] = []
+    for _ in range(round(10.0 / env.control_dt)):
+        state, output = env.step(state, policy.act(state.observation))
+        verdicts.append(np.asarray(output.episode["success"])[np.asarray(output.done)])
+    ended = np.concatenate(verdicts)
+    assert len(ended) >= 20
+    assert ended.mean() > 0.9
+
+
+def test_evaluate_is_what_the_command_says(policy):
+    scores = gj.evaluate(policy, gj.Scenario(episodes=28, seed=3))
+    assert scores.episodes == 28
+    assert scores.success > 0.9
+    with pytest.raises(ConfigError, match="composite motion"):
+        gj.evaluate("walk")
+
+
+def test_what_is_not_possible_is_one_line(policy):
+    with pytest.raises(ConfigError, match="num_envs: expected at least 1, got 0"):
+        gj.make_env(policy, num_envs=0)
+    with pytest.raises(ConfigError, match="a scenario or training=True, got both"):
+        gj.make_env(policy, scenario=gj.Scenario(), training=True)
+    with pytest.raises(CheckpointError, match="shipped policies: flat"):
+        gj.load_policy("falt")
+    with pytest.raises(AttributeError, match="has no attribute 'fly'"):
+        _ = gj.fly
+
+
+def test_a_policy_is_trained_and_loaded(tmp_path):
+    small = ("ppo.num_envs=4", "ppo.num_steps=2", "ppo.minibatch_size=8", "task.pool_size=64")
+    config = gj.load_config("quick", *small, "train.total_steps=16", "network.hidden_sizes=[8]")
+    policy = gj.train(config, tmp_path / "run", quiet=True)
+    assert policy.steps == 16
+    assert policy.config.ppo.num_envs == 4
+
+
+def test_training_episodes_are_asked_for(policy):
+    env = gj.make_env(policy, num_envs=2, training=True)
+    assert env.config == policy.config
+    assert env.reset().observation.shape == (2, env.observation_size)
+    assert gj.make_env(policy, scenario=gj.Scenario(episodes=2)).config.task.clip_start == 0.0
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    code = "import sys, getup_jax; dir(getup_jax); sys.exit('jax' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
