@@ -30,7 +30,7 @@ def follower(built) -> Follower:
 
 def begin(built, follower):
     style = jnp.zeros(PARENTS, int)
-    return follower.start(built.world, style, style, style_curve(built.world, style))
+    return jax.jit(follower.start)(built.world, style, style, style_curve(built.world, style))
 
 
 def test_a_window_leads_on_from_parents_by_its_own_steps(built, follower):
@@ -93,7 +93,9 @@ def test_the_search_follows_a_curve_more_closely_than_a_policy_that_knows_nothin
     assert missed[0] < 0.7 * missed[1]
 
 
-def test_the_bound_of_edits(built):
+def test_the_bound_of_edits(built, monkeypatch):
+    monkeypatch.setattr(follow, "CHILDREN", 64)  # a short search will do, which gets nobody up
+    monkeypatch.setattr(follow, "AHEAD", 4)
     network = NetworkConfig(hidden_sizes=(8,))
     learner = make_learner(built.environment, network, PPOConfig(), total_steps=1000)
     policy = learner.init_learner(jax.random.PRNGKey(0)).policy

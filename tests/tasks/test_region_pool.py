@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +15,16 @@ from getup_jax.nets.prior_data import pose_conditions
 from getup_jax.physics.character import load_character
 from getup_jax.physics.native import NativeEngine
 from getup_jax.physics.surface import link_gaps
-from getup_jax.tasks import draws, early_ends, focus, limp, misfit, practice, region_pool
+from getup_jax.tasks import (
+    curriculum,
+    draws,
+    early_ends,
+    focus,
+    limp,
+    misfit,
+    practice,
+    region_pool,
+)
 from getup_jax.tasks.build import assemble
 from getup_jax.tasks.episode import CLIP, LYING, STANDING
 
@@ -107,8 +117,7 @@ def test_every_region_has_starts_along_the_clip_if_asked(character, site, cache)
         np.testing.assert_array_equal(site.ground.region(qpos[:, :2]), region)
         flat = np.concatenate([rows(built, CLIP, 0, style) for style in range(2)])
         np.testing.assert_allclose(qpos[:, 7:], flat[:, 7:], atol=1e-6)
-    state = built.environment.init(built.world, jax.random.PRNGKey(0), 512)
-    state = state.curriculum.replace(opened=jnp.asarray(4, jnp.int32))
+    state = curriculum.first(TERRAIN).replace(opened=jnp.asarray(4, jnp.int32))
     kind, region = draws._places(task, jax.random.PRNGKey(0), 2000, state)
     share = np.asarray(kind == CLIP)[np.asarray(region) > 0].mean()
     assert share == pytest.approx(task.clip_start, abs=0.04)
@@ -184,9 +193,7 @@ def test_lying_starts_of_another_misfit_are_of_another_cell(character, cache):
     pool = built.world.pool
     regions, count = pool.table.shape[1], pool.table.shape[-1]
     cells = np.asarray(pool.misfit)[np.asarray(pool.table[LYING, 3, 0])]
-    rows = jnp.arange(count, dtype=jnp.int32)
-    zero = jnp.zeros(count, jnp.int32)
-    state = built.environment.start(built.world, zero, zero + LYING, rows, region=zero + 3)
+    state = at(built, LYING, 3, count)
     place, _, part = practice.first_cell(pool, state, built.environment.engine.control_dt)
     np.testing.assert_array_equal(part, cells)
     np.testing.assert_array_equal(place, LYING * regions + 3)
@@ -204,9 +211,14 @@ def test_lying_starts_of_another_misfit_are_of_another_cell(character, cache):
 
 def at(task, kind: int, region: int, count: int = 4):
     """Episodes [count] of the first style in a region."""
-    rows = jnp.arange(count, dtype=jnp.int32) % ROWS
-    zero = jnp.zeros(count, jnp.int32)
-    return task.environment.start(task.world, zero, zero + kind, rows, region=zero + region)
+    kinds, regions = (np.full(count, x, np.int32) for x in (kind, region))
+    return _starts(task.environment, task.world, kinds, regions)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _starts(env, world, kind, region):
+    row = jnp.arange(len(kind), dtype=jnp.int32) % ROWS
+    return env.start(world, jnp.zeros_like(kind), kind, row, region=region)
 
 
 def test_heights_are_above_the_mean_of_the_height_map(uneven, site):
@@ -246,7 +258,7 @@ def test_a_training_step_counts_successes_and_opens_regions(uneven):
     env, world = uneven.environment, uneven.world
     quick = dataclasses.replace(TERRAIN, unlock_successes=1)
     env = dataclasses.replace(env, terrain=quick)
-    state = env.init(world, jax.random.PRNGKey(0), 8)
+    state = jax.jit(env.init, static_argnums=2)(world, jax.random.PRNGKey(0), 8)
     np.testing.assert_array_equal(state.region, 0)
     step = jax.jit(env.step)
     state, output = step(world, state, state.action)
