@@ -37,14 +37,14 @@ def test_a_resumed_run_keeps_the_curriculum_and_goes_on_bit_for_bit(tmp_path, mo
     terrain = dataclasses.replace(TERRAIN, curriculum="schedule", schedule_steps=32)
     config = dataclasses.replace(CONFIG, task=TASK, terrain=terrain)
     task, learner = build(config)
-    iterate = jax.jit(learner.iteration)
-    state, metrics = iterate(task.world, learner.init(task.world, jax.random.PRNGKey(0)))
+    begin, iterate = jax.jit(learner.init), jax.jit(learner.iteration)
+    state, metrics = iterate(task.world, begin(task.world, jax.random.PRNGKey(0)))
     assert float(metrics["rollout/regions_open"]) == 1.0
     halfway = state.environment.curriculum
     assert (int(halfway.steps), int(halfway.opened)) == (3, 1)
     item = {"policy": state.learner.policy, "prior": to_dict(task.prior)}
     checkpoint.save_learner(tmp_path / "run", 1, state, config, item, {"steps": 24})
-    template = learner.init(task.world, jax.random.PRNGKey(1))
+    template = begin(task.world, jax.random.PRNGKey(1))
     restored = checkpoint.restore_learner(tmp_path / "run", template).state
     for _ in range(2):
         state, _ = iterate(task.world, state)
@@ -59,23 +59,19 @@ def test_a_resumed_run_keeps_the_curriculum_and_goes_on_bit_for_bit(tmp_path, mo
 def test_another_batch_takes_over_the_curriculum_and_what_is_learned(tmp_path, monkeypatch):
     monkeypatch.setattr(region_pool, "cache_dir", lambda: tmp_path)
     config = dataclasses.replace(CONFIG, task=TASK, terrain=TERRAIN)
-    task, learner = build(config)
-    eight = learner.init(task.world, jax.random.PRNGKey(0)).environment
+    task, _ = build(config)
+    begin = jax.jit(task.environment.init, static_argnums=2)
+    eight = begin(task.world, jax.random.PRNGKey(0), 8)
     eight = eight.replace(
         focus=eight.focus + 0.25, curriculum=eight.curriculum.replace(opened=jnp.asarray(3))
     )
-    four = make_learner(
-        task.environment,
-        NetworkConfig((8,)),
-        dataclasses.replace(PPO, num_envs=4, minibatch_size=12),
-        total_steps=1000,
-    ).init(task.world, jax.random.PRNGKey(0))
-    taken = with_shared(four.environment, to_nested(eight), "run")
+    four = begin(task.world, jax.random.PRNGKey(0), 4)
+    taken = with_shared(four, to_nested(eight), "run")
     assert int(taken.curriculum.opened) == 3
     np.testing.assert_array_equal(taken.focus, eight.focus)
     assert taken.time.shape == (4,)
     flat, _ = build(dataclasses.replace(config, task=dataclasses.replace(TASK, focus=0.0)))
-    other = flat.environment.start(flat.world, *jnp.zeros((3, 4), jnp.int32))
+    other = jax.jit(flat.environment.start)(flat.world, *jnp.zeros((3, 4), jnp.int32))
     with pytest.raises(CheckpointError, match="run: the array focus"):
         with_shared(other.replace(curriculum=taken.curriculum), to_nested(eight), "run")
 
@@ -93,7 +89,8 @@ def test_without_a_pose_prior_the_action_is_the_servo_target():
     moved = np.asarray(env.servo_target(world, start, jnp.zeros((4, 49)).at[:, 3].set(0.2)))
     neutral = env.character.neutral_qpos[7:].astype(np.float32)
     np.testing.assert_allclose(moved[0] - neutral, np.eye(49)[3] * 0.1, atol=1e-6)
-    state, metrics = jax.jit(learner.iteration)(world, learner.init(world, jax.random.PRNGKey(0)))
+    state = jax.jit(learner.init)(world, jax.random.PRNGKey(0))
+    state, metrics = jax.jit(learner.iteration)(world, state)
     assert float(metrics["rollout/reward_total"]) == float(metrics["rollout/reward_task"])
     assert "rollout/reward_natural" not in metrics
     assert np.isfinite(np.asarray(state.environment.observation)).all()

@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -84,6 +85,24 @@ def quickly(monkeypatch, rounds: int = 1) -> None:
     monkeypatch.setattr(action_regression, "_MINIBATCH", 64)
 
 
+@pytest.fixture(scope="module")
+def lesson_memory() -> dict[str, Any]:
+    return {}
+
+
+@pytest.fixture
+def remembered(lesson_memory, monkeypatch) -> None:
+    """What the old policy sees is watched once for all tests that teach one and the same."""
+    watched = action_regression.watched
+
+    def watched_once(*args: Any) -> lessons.Lesson:
+        if "old" not in lesson_memory:
+            lesson_memory["old"] = watched(*args)
+        return lesson_memory["old"]
+
+    monkeypatch.setattr(action_regression, "watched", watched_once)
+
+
 def differences(log: list[str]) -> tuple[float, float, float]:
     """Degrees after and before, and |dq|_1, of the last round."""
     after, before, offsets = (float(x) for x in re.findall(r"[0-9]+\.[0-9]+", log[-1]))
@@ -99,6 +118,7 @@ def test_an_action_that_means_the_same_leaves_the_policy_alone(task):
     assert log == []
 
 
+@pytest.mark.usefixtures("remembered")
 def test_the_actor_learns_the_old_targets(task, old, monkeypatch):
     quickly(monkeypatch)
     learner, policy = make_policy(task, CONFIG)
@@ -116,6 +136,7 @@ def test_the_actor_learns_the_old_targets(task, old, monkeypatch):
         assert (a[block] != b[block]).any()
 
 
+@pytest.mark.usefixtures("remembered")
 def test_offsets_are_avoided_where_latents_can_say_the_same(task, old, monkeypatch):
     quickly(monkeypatch)
     learner, policy = make_policy(task, CONFIG)

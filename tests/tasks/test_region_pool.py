@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -187,9 +188,7 @@ def test_lying_starts_of_another_misfit_are_of_another_cell(character, cache):
     pool = built.world.pool
     regions, count = pool.table.shape[1], pool.table.shape[-1]
     cells = np.asarray(pool.misfit)[np.asarray(pool.table[LYING, 3, 0])]
-    rows = jnp.arange(count, dtype=jnp.int32)
-    zero = jnp.zeros(count, jnp.int32)
-    state = built.environment.start(built.world, zero, zero + LYING, rows, region=zero + 3)
+    state = at(built, LYING, 3, count)
     place, _, part = sampler_update.first_cell(pool, state, built.environment.engine.control_dt)
     np.testing.assert_array_equal(part, cells)
     np.testing.assert_array_equal(place, LYING * regions + 3)
@@ -207,9 +206,14 @@ def test_lying_starts_of_another_misfit_are_of_another_cell(character, cache):
 
 def at(task, kind: int, region: int, count: int = 4):
     """Episodes [count] of the first style in a region."""
-    rows = jnp.arange(count, dtype=jnp.int32) % ROWS
-    zero = jnp.zeros(count, jnp.int32)
-    return task.environment.start(task.world, zero, zero + kind, rows, region=zero + region)
+    kinds, regions = (np.full(count, x, np.int32) for x in (kind, region))
+    return _starts(task.environment, task.world, kinds, regions)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _starts(env, world, kind, region):
+    row = jnp.arange(len(kind), dtype=jnp.int32) % ROWS
+    return env.start(world, jnp.zeros_like(kind), kind, row, region=region)
 
 
 def test_heights_are_above_the_mean_of_the_height_map(uneven, site):
@@ -249,7 +253,7 @@ def test_a_training_step_counts_successes_and_opens_regions(uneven):
     env, world = uneven.environment, uneven.world
     quick = dataclasses.replace(TERRAIN, unlock_successes=1)
     env = dataclasses.replace(env, terrain=quick)
-    state = env.init(world, jax.random.PRNGKey(0), 8)
+    state = jax.jit(env.init, static_argnums=2)(world, jax.random.PRNGKey(0), 8)
     np.testing.assert_array_equal(state.region, 0)
     step = jax.jit(env.step)
     state, output = step(world, state, state.action)

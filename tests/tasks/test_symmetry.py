@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +22,7 @@ from getup_jax.physics.mirror_image import joint_mirror
 from getup_jax.physics.native import NativeEngine
 from getup_jax.pose_prior.prior import from_dict, to_dict
 from getup_jax.rl.learner import Learner, make_learner
+from getup_jax.rl.state import TrainState
 from getup_jax.runtime.checkpoint import CHECKPOINTS, load_policy, restore_learner, save_learner
 from getup_jax.runtime.pytree_store import from_nested
 
@@ -57,6 +60,23 @@ def task() -> BuiltTask:
 def learner(task) -> Learner:
     ppo = dataclasses.replace(CONFIG.ppo, num_envs=8, num_steps=4, minibatch_size=16, epochs=1)
     return make_learner(task.environment, NETWORK, ppo, total_steps=1000)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Trained:
+    """A learner's compiled functions, and what they gave."""
+
+    begin: Callable[[Any, jax.Array], TrainState]
+    iterate: Callable[[Any, TrainState], tuple[TrainState, dict[str, jax.Array]]]
+    first: TrainState
+    one: TrainState  # after an iteration
+
+
+@pytest.fixture(scope="module")
+def trained(task, learner) -> Trained:
+    begin, iterate = jax.jit(learner.init), jax.jit(learner.iteration)
+    first = begin(task.world, jax.random.PRNGKey(0))
+    return Trained(begin, iterate, first, iterate(task.world, first)[0])
 
 
 def symmetry_of(task: BuiltTask) -> Symmetry:
@@ -134,11 +154,11 @@ def test_a_state_and_its_image_stay_images_under_the_policy(task, learner):
     """The whole loop: observation, policy, prior, filter, servos, contacts, rewards."""
     env, world, found = task.environment, task.world, symmetry_of(task)
     qpos, qvel = mirrored_pair(env.character, seed=4)
-    state = env.start(world, jnp.arange(2), *jnp.zeros((2, 2), jnp.int32))
+    state = jax.jit(env.start)(world, jnp.arange(2), *jnp.zeros((2, 2), jnp.int32))
     action = 0.3 * jax.random.normal(jax.random.PRNGKey(3), (65,))
     first = jnp.stack([action, found.action(action)])
     state = state.replace(physics=env.engine.place(qpos, 0.3 * qvel), action=first)
-    state, _ = env.advance(world, state, first)  # now it is observed
+    state, _ = jax.jit(env.advance)(world, state, first)  # now it is observed
     policy = learner.init_learner(jax.random.PRNGKey(0)).policy
     # the first actions are nearly zero
     actor = jax.tree.map(lambda x: 3.0 * x, policy.actor)
@@ -185,16 +205,14 @@ def test_physics_is_symmetric_as_far_as_the_solver_finds_its_solution():
     assert converged < 1e-5 < shipped < 1e-2
 
 
-def test_a_learner_is_equivariant_and_stays_so_while_it_trains(task, learner):
-    found = symmetry_of(task)
-    state = jax.jit(learner.init)(task.world, jax.random.PRNGKey(0))
-    iterate = jax.jit(learner.iteration)
+def test_a_learner_is_equivariant_and_stays_so_while_it_trains(task, learner, trained):
+    found, state = symmetry_of(task), trained.first
     for _ in range(2):
-        state, metrics = iterate(task.world, state)
+        state, metrics = trained.iterate(task.world, state)
         losses = [float(x) for name, x in metrics.items() if name.startswith("loss/")]
         assert losses
         assert np.isfinite(losses).all()
-    before = learner.init(task.world, jax.random.PRNGKey(0)).learner.policy.actor
+    before = trained.first.learner.policy.actor
     changed = jax.tree.map(lambda a, b: bool((a != b).any()), before, state.learner.policy.actor)
     assert any(jax.tree.leaves(changed))
     policy, seen = state.learner.policy, state.environment.observation
@@ -229,12 +247,11 @@ def test_without_a_prior_the_action_is_offsets_alone(character):
     assert (found.action.size, found.observation.size) == (49, 352 - 16)
 
 
-def test_a_mirrored_run_is_restored_and_goes_on_bit_for_bit(task, learner, tmp_path):
-    iterate = jax.jit(learner.iteration)
-    state, _ = iterate(task.world, learner.init(task.world, jax.random.PRNGKey(0)))
+def test_a_mirrored_run_is_restored_and_goes_on_bit_for_bit(task, learner, trained, tmp_path):
+    iterate, state = trained.iterate, trained.one
     item = {"policy": state.learner.policy, "prior": to_dict(task.world.prior)}
     save_learner(tmp_path / CHECKPOINTS, 1, state, NEWTON, item, {})
-    template = learner.init(task.world, jax.random.PRNGKey(1))
+    template = trained.begin(task.world, jax.random.PRNGKey(1))
     restored = restore_learner(tmp_path / CHECKPOINTS, template).state
     for _ in range(2):
         state, _ = iterate(task.world, state)

@@ -78,7 +78,7 @@ def watched(
         return collected.environment, lesson(flat)
 
     keys = jax.random.split(key, rollouts + 1)
-    state = env.init(world, keys[0], num_envs)
+    state = jax.jit(env.init, static_argnums=2)(world, keys[0], num_envs)
     parts = []
     for key_roll in keys[1:]:
         state, part = collect(world, state, key_roll)

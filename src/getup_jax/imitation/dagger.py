@@ -25,7 +25,7 @@ import numpy as np
 
 from getup_jax.envs.composite.build import BuiltComposite
 from getup_jax.envs.composite.goals.combine import Goals
-from getup_jax.envs.composite.task import CompositeWorld
+from getup_jax.envs.composite.task import CompositeTask, CompositeWorld
 from getup_jax.imitation import action_regression
 from getup_jax.networks import gaussian
 from getup_jax.rl.actor_critic import normalized, observe
@@ -117,11 +117,11 @@ def _play(
     key_row, key_start, key_noise, key_arc = jax.random.split(key, 4)
     row = jax.random.randint(key_row, (learner.config.num_envs,), 0, len(targets))
     arc = jax.random.randint(key_arc, row.shape, 0, targets.shape[1])
-    start = built.environment.start(world, row, key_start)
-    state = env.adopt(stage.world, start, start.goals, key_start)
+    state = _BEGIN(built.environment, env, world, stage.world, row, key_start)
     if stage.new is not None:
         state = env.handed_over(state, left)
     way = (targets[row, arc] - np.asarray(world.target_centre)) / np.asarray(world.target_scale)
+    act = jax.jit(learner.act)
     goes_on = np.ones(len(row), bool)
     kept: list[Rehearsed] = []
     for step, key_step in enumerate(jax.random.split(key_noise, way.shape[1])):
@@ -136,7 +136,7 @@ def _play(
             seen = np.asarray(state.observation)[goes_on]
             kept.append(Rehearsed(seen, np.asarray(action)[goes_on]))
         if own:
-            action = jax.jit(learner.act)(policy, state.observation)
+            action = act(policy, state.observation)
         action = gaussian.sample(key_step, action, jnp.full_like(action, std))
         state, fell = _STEP(env, stage.world, state, action)
         goes_on &= ~np.asarray(fell)
@@ -154,6 +154,17 @@ def _bearings(turns: np.ndarray, arc: np.ndarray, key: jax.Array) -> jax.Array:
     low = np.concatenate([[-math.pi], inner])[np.argsort(order)]
     high = np.concatenate([inner, [math.pi]])[np.argsort(order)]
     return jax.random.uniform(key, arc.shape, minval=low[arc], maxval=high[arc])
+
+
+def _begin(
+    task: CompositeTask, env: Any, own: CompositeWorld, world: Any, row: jax.Array, key: jax.Array
+) -> Any:
+    """Episodes of `env` that start on the rows [B] of the clips; its task's world is `own`."""
+    start = task.start(own, row, key)
+    return env.adopt(world, start, start.goals, key)
+
+
+_BEGIN = jax.jit(_begin, static_argnums=(0, 1))
 
 
 def _turn(env: Any, world: Any, state: Any, goals: Goals, bearing: jax.Array) -> Any:

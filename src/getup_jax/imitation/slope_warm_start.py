@@ -100,6 +100,11 @@ def _held(learner: Learner, env: GetUpTask, world: World, key: jax.Array) -> Les
     height = observation[..., env.observer.slices()["features"]][..., 0]
     stands = np.abs(height - height[:1]) < _SUNK_M
     observation, action = jnp.asarray(observation[stands]), jnp.asarray(action[stands])
+    return _lesson(env, world, observation, action)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _lesson(env: GetUpTask, world: World, observation: jax.Array, action: jax.Array) -> Lesson:
     condition = env.observer.condition(observation)
     return Lesson(observation, action, env.units(world).target(action, condition), condition)
 
@@ -108,13 +113,10 @@ def _sway(size: int, env: GetUpTask, world: World, key: jax.Array) -> tuple[jax.
     """Observations [T, B, O], and the actions [T, B, A] that hold the pose of the start."""
     _, regions, styles, rows = world.pool.table.shape
     keys = jax.random.split(key, 4)
-    state = env.start(
-        world,
-        jax.random.randint(keys[0], (size,), 0, styles),
-        jnp.full(size, STANDING, jnp.int32),
-        jax.random.randint(keys[1], (size,), 0, rows),
-        region=jax.random.randint(keys[2], (size,), 1, regions),
-    )
+    style = jax.random.randint(keys[0], (size,), 0, styles)
+    row = jax.random.randint(keys[1], (size,), 0, rows)
+    region = jax.random.randint(keys[2], (size,), 1, regions)
+    state = _start(env, world, style, row, region)
     hold, push, seen = state.action, jnp.zeros_like(state.action), []
     for index, key_push in enumerate(jax.random.split(keys[3], _HOLD_STEPS)):
         if index % _PUSH_STEPS == 0:
@@ -123,6 +125,13 @@ def _sway(size: int, env: GetUpTask, world: World, key: jax.Array) -> tuple[jax.
             seen.append(state.observation)
         state = _step(env, world, state, hold + push)
     return jnp.stack(seen), jnp.broadcast_to(hold, (len(seen), *hold.shape))
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _start(
+    env: GetUpTask, world: World, style: jax.Array, row: jax.Array, region: jax.Array
+) -> EpisodeState:
+    return env.start(world, style, jnp.full_like(row, STANDING), row, region=region)
 
 
 @functools.partial(jax.jit, static_argnums=0)
