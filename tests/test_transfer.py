@@ -95,7 +95,7 @@ def remembered(lesson_memory, monkeypatch) -> None:
     """What the old policy sees is watched once for all tests that teach one and the same."""
     watched = action_regression.watched
 
-    def watched_once(*args: Any) -> lessons.Lesson:
+    def watched_once(*args: Any) -> action_regression.Lesson:
         if "old" not in lesson_memory:
             lesson_memory["old"] = watched(*args)
         return lesson_memory["old"]
