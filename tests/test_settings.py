@@ -241,3 +241,42 @@ def test_errors_in_sub_configs_name_the_whole_key(values, message):
     with pytest.raises(ConfigError) as caught:
         root({"extra": values})
     assert message in str(caught.value)
+
+
+# --- a config based on another
+
+
+def write_all(folder, **files: str) -> None:
+    for name, text in files.items():
+        (folder / f"{name}.yaml").write_text(text)
+
+
+def test_a_config_changes_its_base(tmp_path):
+    write_all(
+        tmp_path, one="ppo: {num_envs: 8, epochs: 3}\nseed: 4", two="base: one\nppo: {epochs: 2}"
+    )
+    write_all(tmp_path, three="base: two.yaml\nseed: 5", shipped="base: flat\nseed: 6")
+    config = load_config(tmp_path / "three.yaml", ["ppo.num_steps=7", "ppo.minibatch_size=56"])
+    assert (config.ppo.num_envs, config.ppo.epochs, config.ppo.num_steps) == (8, 2, 7)
+    assert config.seed == 5
+    assert load_config(tmp_path / "shipped.yaml") == load_config("flat", ["seed=6"])
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("base: other", r"a\.yaml: base: comes back to itself"),
+        ("base: nothing", r"a\.yaml: base: nothing: no such config file; the shipped configs are"),
+        ("base: [flat]", r"a\.yaml: base: expected the name of a config, got \["),
+        ("base: flat\nppo: {epochs: 0}", r"ppo\.epochs: .*a\.yaml"),
+    ],
+)
+def test_a_base_that_cannot_be(tmp_path, text, problem):
+    write_all(tmp_path, a=text, other="base: a")
+    with pytest.raises(ConfigError, match=problem):
+        load_config(tmp_path / "a.yaml")
+
+
+def test_what_a_run_saves_has_no_base():
+    saved = dump_yaml(load_config("composite_walk_heading"))
+    assert "base:" not in saved

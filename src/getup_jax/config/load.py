@@ -1,7 +1,8 @@
 """YAML files and `section.key=value` overrides into a Config, and back.
 
-A YAML file holds only what differs from the defaults in `config/`. Values convert by
-the annotation of their field, so 3e-4 is a number although PyYAML reads it as text.
+A YAML file holds only what differs from the defaults in `config/`, or from another file, its
+`base`. Values convert by the annotation of their field, so 3e-4 is a number although PyYAML reads
+it as text.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ RETIRED = {
     "ppo.value_coefficient": "nothing: the critic has an optimiser of its own",
 }
 
+BASE = "base"  # the key by which a file names another one that it changes
 _DEEPEST = 10  # names in the key of an override
 
 
@@ -45,7 +47,7 @@ def load_config(path: str | Path | None, overrides: Sequence[str] = ()) -> Confi
     Raises ConfigError that names the key, or the file and line.
     """
     file = None if path is None else find_config(path)
-    return _build(file, {} if file is None else completed(_read_yaml(file)), overrides)
+    return _build(file, {} if file is None else completed(_read_with_base(file)), overrides)
 
 
 def load_saved_config(file: Path) -> Config:
@@ -118,6 +120,24 @@ def _read_yaml(file: Path) -> dict[str, Any]:
     if not isinstance(values, dict):
         raise ConfigError(f"{file}: expected a mapping of settings, got {describe(values)}")
     return values
+
+
+def _read_with_base(file: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """The mapping in a YAML file, laid over that of its base; `above`: the files based on it."""
+    if file.resolve() in above:
+        raise ConfigError(f"{file}: {BASE}: comes back to itself; expected another file")
+    values = _read_yaml(file)
+    name = values.pop(BASE, None)
+    if name is None:
+        return values
+    if not isinstance(name, str):
+        raise ConfigError(f"{file}: {BASE}: expected the name of a config, got {describe(name)}")
+    beside = file.parent / (name if name.endswith(".yaml") else f"{name}.yaml")
+    try:
+        base = beside if beside.is_file() else find_config(name)
+    except ConfigError as error:
+        raise ConfigError(f"{file}: {BASE}: {error}") from None
+    return _merge(_read_with_base(base, (*above, file.resolve())), values)
 
 
 def _parse_override(override: str) -> dict[str, Any]:
