@@ -1,0 +1,58 @@
+"""What the documents point to is there, and they stay short."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import getup_jax as gj
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+LINK = re.compile(r"\]\((?P<inline>[^)\s]+)\)|^\[\w+\]: (?P<named>\S+)", re.MULTILINE)
+
+
+def headings(text: str) -> set[str]:
+    """The anchors of a document's headings, as GitHub makes them."""
+    titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("file", DOCUMENTS, ids=lambda f: str(f.relative_to(ROOT)))
+def test_every_link_leads_somewhere(file):
+    for match in LINK.finditer(file.read_text(encoding="utf-8")):
+        target = match["inline"] or match["named"]
+        if target.startswith(("http://", "https://", "mailto:")):
+            continue
+        path, _, anchor = target.partition("#")
+        found = file if not path else file.parent / path
+        assert found.exists(), target
+        if anchor:
+            assert anchor in headings(found.read_text(encoding="utf-8")), target
+
+
+@pytest.mark.parametrize(("name", "most"), [("README.md", 150), ("docs/results.md", 200)])
+def test_what_is_read_first_is_short(name, most):
+    lines = (ROOT / name).read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= most
+    if name == "README.md":
+        assert [line for line in lines if len(line) > 120] == []
+
+
+def test_the_modules_that_design_names_are_there():
+    table = (
+        (ROOT / "docs/design.md").read_text(encoding="utf-8").split("## Where to change what")[1]
+    )
+    table = table.split("\n## ")[0]
+    named = re.findall(r"`([a-z_]+(?:/[a-z_0-9]+)*(?:/|\.py))`", table)
+    assert len(named) > 20
+    assert [n for n in named if not (ROOT / "src/getup_jax" / n).exists()] == []
+
+
+def test_the_front_door_is_documented():
+    text = (ROOT / "docs/python.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"gj\.(\w+)", text))
+    assert named <= set(gj.__all__)
+    assert set(gj.__all__) - {"Env", "Policy"} <= named
