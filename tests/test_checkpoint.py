@@ -377,7 +377,7 @@ def test_a_partial_folder_is_ignored_and_cleaned_up(run):
     assert names(folder) == ["00000004", "00000006"]
 
 
-@pytest.mark.parametrize("where", ["write_item", "integrity.write", "manifest.replace_folder"])
+@pytest.mark.parametrize("where", ["write_item", "integrity.write", "integrity.replace_folder"])
 def test_a_full_disk_costs_nothing_but_the_new_checkpoint(run, monkeypatch, where):
     def fail(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -407,7 +407,7 @@ def test_a_write_that_the_system_refuses_is_an_error(run):
 
 KILLED = """
 import os, pathlib, signal, sys
-from getup_jax import checkpoint, config
+from getup_jax.runtime import checkpoint, config
 write = checkpoint.write_item
 def killed(folder, nested):
     write(folder, nested)
