@@ -407,7 +407,8 @@ def test_a_write_that_the_system_refuses_is_an_error(run):
 
 KILLED = """
 import os, pathlib, signal, sys
-from getup_jax.runtime import checkpoint, config
+from getup_jax import config
+from getup_jax.runtime import checkpoint
 write = checkpoint.write_item
 def killed(folder, nested):
     write(folder, nested)

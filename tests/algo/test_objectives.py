@@ -52,7 +52,8 @@ def plain():
 
 @pytest.mark.parametrize("separate", [True, False])
 def test_one_objective_with_one_reward_is_plain_ppo_bit_for_bit(plain, separate: bool):
-    composite = make_learner(Probe(), NETWORK, PROBE_PPO, 10_000, objectives=_objectives(separate))
+    rewards = _objectives(separate)
+    composite = make_learner(Probe(), NETWORK, PROBE_PPO, 10_000, reward_model=rewards)
     expected, metrics = plain
     found, same = _train(composite)
     assert found.learner.discriminators == {}

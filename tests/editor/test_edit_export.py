@@ -76,7 +76,7 @@ def test_a_film_needs_the_extra(motion, simulator, monkeypatch):
     def missing():
         raise ConfigError("--video: needs imageio")
 
-    monkeypatch.setattr(exports.video, "require", missing)
+    monkeypatch.setattr(exports.film, "require", missing)
     with pytest.raises(ConfigError, match="needs imageio"):
         export(motion, simulator.character, "mp4")
 
