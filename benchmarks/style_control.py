@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> dict[str, ControlGain]:
     loaded = checkpoint.load_policy(args.policy)
     config = evaluation_config(loaded.config, scenario)
     choose = chosen_styles(config, scenario)
-    prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
+    prior = pose_prior.from_checkpoint(loaded.prior)
     task = build_task(config, print, prior, choose)
     learner, policy = restore_policy(loaded, task)
     styles = numbers(args.only, task.getups)

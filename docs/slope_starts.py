@@ -47,7 +47,7 @@ def main() -> None:
         raise ConfigError(f"--ckpt {args.ckpt}: was trained on a flat plane, which has no slopes")
     if args.rows < 1 or args.hand < 0 or args.until <= 0:
         raise ConfigError("--rows, --hand, --until: expected at least 1, at least 0, more than 0")
-    prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
+    prior = pose_prior.from_checkpoint(loaded.prior)
     config = _config(loaded.config, args)
     task = build_task(config, print, prior)
     startable, region = task.world.pool.startable, REGIONS.index(args.region)

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from getup_jax.config.load import load_config
-from getup_jax.training.run import build_composite_job, build_job
+from getup_jax.training.run import build_job
 
 FILE = Path(__file__).with_name("goldens.json")
 PPO = ["ppo.num_envs=8", "ppo.num_steps=4", "ppo.minibatch_size=16", "ppo.epochs=1"]
@@ -45,13 +45,13 @@ QUICK = ("getup", "composite")  # the others are slow: terrain makes its start s
 
 def measure(name: str) -> list[dict[str, float | None]]:
     """The metrics of every iteration; None where there is no number."""
-    config = load_config(*RUNS[name][:1], RUNS[name][1:])
+    path, *overrides = RUNS[name]
+    config = load_config(path, overrides)
 
     def log(text: str) -> None:
         pass
 
-    is_composite = config.composite is not None and len(config.composite.groups) > 0
-    job = build_composite_job(config, log)[1] if is_composite else build_job(config, log)
+    job = build_job(config, log)
     state = job.learner.init(job.world, jax.random.PRNGKey(config.seed))
     iterate, found = jax.jit(job.learner.iteration), []
     for _ in range(ITERATIONS):

@@ -76,8 +76,7 @@ class Policy:
     @property
     def prior(self) -> PosePrior | None:
         """What its latent actions mean; None: they are servo targets."""
-        stored = self.loaded.prior
-        return None if stored is None else pose_prior.from_dict(stored)
+        return pose_prior.from_checkpoint(self.loaded.prior)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -103,7 +102,7 @@ class Env:
     @property
     def control_dt(self) -> float:
         """Seconds of a step."""
-        return float(self.environment.engine.control_dt)
+        return float(composite_rollout.task_of(self.environment).engine.control_dt)
 
     def reset(self, seed: int = 0) -> Any:
         """The first state of all episodes; `state.observation` is [num_envs, O]."""
@@ -162,17 +161,16 @@ def make_env(
         raise ConfigError(f"num_envs: expected at least 1, got {num_envs}")
     if training and scenario is not None:
         raise ConfigError("make_env: expected a scenario or training=True, got both")
-    policy = source if isinstance(source, Policy) else None
-    if isinstance(source, Policy | Config):
-        config = source.config if isinstance(source, Policy) else source
+    prior = None
+    if isinstance(source, Policy):
+        config, prior = source.config, source.prior
     else:
-        config = load_config(source)
+        config = source if isinstance(source, Config) else load_config(source)
     if config.composite_motion:
         if scenario is not None:
             raise ConfigError("scenario: only for getting up, this config is of composite motion")
-        job = _run.build_composite_job(config, log)[1]
+        job = _run.build_job(config, log)
         return Env(config, num_envs, job.learner.env, job.world, ())
-    prior = None if policy is None else policy.prior
     if not training:
         config = getup.evaluation_config(config, scenario or Scenario())
     built = build_task(config, log, prior, getup.chosen_styles(config, scenario or Scenario()))
@@ -208,6 +206,6 @@ def evaluate(
     if policy.config.composite_motion:
         raise ConfigError(f"{policy.name}: is of composite motion; use getup-eval --ckpt")
     scenario = scenario or Scenario()
-    number = getup.episode_count(policy.config, scenario)
+    number = getup.evaluation_config(policy.config, scenario).task.pool_size
     with Display(number, quiet, unit="episodes") as display:
         return getup.evaluate(policy.loaded, scenario, display)[1]

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from probes import Probe
 from tiny_composite import CONFIG, tiny_composite
 
+from getup_jax.api import Env
 from getup_jax.config import Config, ConfigError, NetworkConfig
 from getup_jax.envs.composite.meta.chain import with_meta
 from getup_jax.physics.character import load_character
@@ -108,6 +109,8 @@ def test_a_meta_action_reaches_the_pose_that_its_own_policy_would(trained):
     drawn = jax.jit(task.meta_action)(meta_world, [observation], jax.random.key(0))
     assert np.abs(np.asarray(drawn - action)).max() > 1e-3
     assert task.observation_size == env.observation_size + 28
+    front = Env(CONFIG, 1, task, meta_world, ())  # which has no engine of its own
+    assert front.control_dt == env.engine.control_dt
 
 
 @pytest.mark.parametrize("rehearse", [True, False])

@@ -11,13 +11,7 @@ from getup_jax.config import ConfigError
 from getup_jax.evaluation import control_gain, plot
 from getup_jax.evaluation import film as films
 from getup_jax.evaluation.composite import evaluate_composite
-from getup_jax.evaluation.getup import (
-    description,
-    episode_count,
-    evaluate,
-    evaluate_edits,
-    evaluation_config,
-)
+from getup_jax.evaluation.getup import description, evaluate, evaluate_edits, evaluation_config
 from getup_jax.evaluation.metrics import to_json
 from getup_jax.evaluation.rollout import Episodes
 from getup_jax.evaluation.scenario import Scenario
@@ -39,8 +33,8 @@ def evaluate_command(args: argparse.Namespace) -> int:
     if args.script is not None:
         raise ConfigError("--script: only for policies of composite motion")
     scenario = to_scenario(args)
-    evaluation_config(loaded.config, scenario)  # a mistake is said before anything is built
-    number = episode_count(loaded.config, scenario)
+    # a mistake is said before anything is built
+    number = evaluation_config(loaded.config, scenario).task.pool_size
     with Display(number, unit="episodes") as display:
         display.log(f"{loaded.path}: {loaded.metadata.get('steps', 0):,} steps of training")
         episodes, scores = evaluate(loaded, scenario, display)

@@ -76,7 +76,7 @@ class Simulator:
     def build(cls, loaded: LoadedPolicy, log: Log) -> Simulator:
         """Load the motions and make the start states of a checkpoint's own ground."""
         config = editor_config(loaded.config)
-        prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
+        prior = pose_prior.from_checkpoint(loaded.prior)
         task = build_task(config, log, prior, _with_clips)
         body = body_digest(task.environment.character.model)
         warn_if_other(loaded.path, loaded.metadata, body, log)

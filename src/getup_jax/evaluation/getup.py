@@ -51,8 +51,8 @@ Choice = Callable[[tuple[GetUp, ...], CharacterSpec], tuple[GetUp, ...]]
 def evaluate(loaded: LoadedPolicy, scenario: Scenario, display: Display) -> tuple[Episodes, Scores]:
     """Run and score the episodes; raises ConfigError where the policy cannot be asked that."""
     config = evaluation_config(loaded.config, scenario)
-    number = episode_count(loaded.config, scenario)
-    prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
+    number = config.task.pool_size
+    prior = pose_prior.from_checkpoint(loaded.prior)
     task = build_task(config, display.log, prior, chosen_styles(config, scenario))
     body = body_digest(task.environment.character.model)
     warn_if_other(loaded.path, loaded.metadata, body, display.log)
@@ -112,7 +112,7 @@ def evaluation_config(config: Config, scenario: Scenario) -> Config:
         stand_start=float(scenario.start == "standing"),
         start_noise_rad=scenario.start_noise_rad,
         terminate_reward=TaskConfig.terminate_reward,
-        pool_size=episode_count(config, scenario),
+        pool_size=_episode_count(config, scenario),
         stand_time_s=stand_time_s,
         **_dropped(task, scenario.drops),
     )
@@ -132,7 +132,7 @@ def _dropped(task: TaskConfig, drops: str | None) -> dict[str, Any]:
     return {"limp_share": 1.0, "limp_drops": count, **DROPPED[drops]}
 
 
-def episode_count(config: Config, scenario: Scenario) -> int:
+def _episode_count(config: Config, scenario: Scenario) -> int:
     """How many episodes: as many as asked for, or the default for the ground."""
     regions = 1 if config.terrain is None else len(REGIONS)
     curves = sum(len(read_curve_file(path).durations) for path in scenario.curves)

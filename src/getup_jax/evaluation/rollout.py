@@ -114,7 +114,7 @@ class Roller:
             state, output = self.env.advance(world, carry.state, action)
             rates = jnp.concatenate([carry.rates, state.physics.kinematics.qvel[None, :, 6:]])
             trace = self._trace(world, carry.running, state, output, rates)
-            running = carry.running & ~(output.terminated | output.truncated)
+            running = carry.running & ~output.done
             return Carry(state, running, rates[1:]), trace
 
         return jax.lax.scan(step, carry, None, length=CHUNK)

@@ -80,12 +80,12 @@ def make_teacher(
 
     Raises CheckpointError where the run cannot begin with the policy.
     """
-    env, where = learner.env, f"train.init_from: {loaded.path}:"
+    env = learner.env
     assert isinstance(env, GetUpTask)
-    prior = None if loaded.prior is None else pose_prior.from_dict(loaded.prior)
+    prior = pose_prior.from_checkpoint(loaded.prior)
     observer = _observer(env, loaded.config, prior)
     symmetry = find_symmetry(loaded.config, env.character, observer, prior)
-    _check(config, learner, world, loaded, symmetry is not None, where)
+    _check(config, learner, world, loaded, prior, symmetry is not None)
     latents = 0 if prior is None else prior.latent_size
     old = dataclasses.replace(env, observer=observer, symmetry=symmetry, latent_size=latents)
     model = make_actor_critic(old, loaded.config.network, config.ppo.normalize_observation)
@@ -114,11 +114,12 @@ def _check(
     learner: Learner,
     world: World,
     loaded: LoadedPolicy,
+    prior: PosePrior | None,
     was_mirrored: bool,
-    where: str,
 ) -> None:
-    """Raise CheckpointError where the run cannot begin with the policy."""
-    if (world.prior is None) != (loaded.prior is None):
+    """Raise CheckpointError where the run cannot begin with the policy and its prior."""
+    where = f"train.init_from: {loaded.path}:"
+    if (world.prior is None) != (prior is None):
         was, here = ("with", "has none") if world.prior is None else ("without", "has one")
         null = "leave out" if world.prior is None else "set"
         raise CheckpointError(
@@ -129,9 +130,8 @@ def _check(
     if config.train.init_learner and was_mirrored != (learner.model.symmetry is not None):
         was = str(was_mirrored).lower()
         settings = f"network.mirror={was}"
-        if loaded.prior is not None:
-            mirrored = pose_prior.from_dict(loaded.prior).mirrored
-            settings += f" prior.mirror={str(mirrored).lower()}"
+        if prior is not None:
+            settings += f" prior.mirror={str(prior.mirrored).lower()}"
         raise CheckpointError(
             f"{where} network.mirror is {was} there; expected the same here with "
             f"train.init_learner; set {settings}"

@@ -109,3 +109,8 @@ def from_dict(state: Mapping[str, Any]) -> PosePrior:
     if set(state) != set(_FIELDS):
         raise ValueError(f"pose prior: expected {sorted(_FIELDS)}, got {sorted(state)}")
     return PosePrior(**jax.tree.map(jnp.asarray, dict(state)))
+
+
+def from_checkpoint(state: Mapping[str, Any] | None) -> PosePrior | None:
+    """The prior of a checkpoint's policy; None where it was trained without one."""
+    return None if state is None else from_dict(state)

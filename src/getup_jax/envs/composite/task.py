@@ -133,7 +133,7 @@ class CompositeTask:
         after, output = self.advance(world, state, action)
         key_next, key_draw, key_start = jax.random.split(after.key, 3)
         drawn = self._draw(world, key_draw, action.shape[0])
-        done = output.terminated | output.truncated
+        done = output.done
 
         def fresh(index: jax.Array) -> CompositeState:
             # the first index of a chunk is in no other

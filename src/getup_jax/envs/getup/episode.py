@@ -65,7 +65,7 @@ class EpisodeState:
     key: jax.Array
     # [B] s, time on the curve at which a short episode is cut, inf: at its end; None: all are
     until: jax.Array | None = None
-    # [3 R, G, bins] success of the batch's starts; see focus.py
+    # [3 R, G, bins] success of the batch's starts; see start_prioritisation.py
     focus: jax.Array | None = None
     # [B] N, most lift of the helping hand; [3 R, G, bins] its levels; None: there is no hand
     lift: jax.Array | None = None

@@ -3,12 +3,12 @@
 It lifts like a rope while the neck is below the curve, and turns the pelvis towards the curve's
 torso angles, so that it needs no more than the curve. On a slope it also turns a body that lies or
 sits with its legs up the slope, until they are across it: as it lies it hardly ever gets up. What
-it may give at most is a share of the full hand, its level; every cell of `focus.py` has its own. A
-level falls with each success of an episode that started there with the hand, and rises with each
-failure, so that a third of them (at the default rates) succeed until the hand is gone (compare Yu
-et al. 2018, Learning symmetric and low-energy locomotion). Starts with the hand are drawn at a
-frontier of their own, that of 1 - level: with it a whole rise is learned before its parts are
-without. Evaluation has no hand.
+it may give at most is a share of the full hand, its level; every cell of `start_prioritisation.py`
+has its own. A level falls with each success of an episode that started there with the hand, and
+rises with each failure, so that a third of them (at the default rates) succeed until the hand is
+gone (compare Yu et al. 2018, Learning symmetric and low-energy locomotion). Starts with the hand
+are drawn at a frontier of their own, that of 1 - level: with it a whole rise is learned before its
+parts are without. Evaluation has no hand.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from getup_jax.envs.getup.resets.pool import Pool
 
 
 def first_cell(pool: Pool, state: EpisodeState, control_dt: float) -> tuple[jax.Array, ...]:
-    """Indices [B] of the cells of `focus.py` in which the episodes started."""
+    """Indices [B] of the cells of `start_prioritisation.py` in which the episodes started."""
     begin = (state.time - state.record.steps * control_dt) / state.duration
     place = start_prioritisation.place_of(pool, state.kind, state.region)
     return place, state.getup, start_prioritisation.part_of(begin, state.misfit)
@@ -47,7 +47,7 @@ def learned(
         return None, None
     cell = first_cell(pool, state, control_dt)
     success = output.truncated & stands(state.record)
-    ended = (output.terminated | output.truncated) & runs_to_the_end(state)
+    ended = output.done & runs_to_the_end(state)
     alone = is_alone(state)
     after = success_rate.update(
         state.focus, cell, ended & alone, success, start_prioritisation.RATE
@@ -65,7 +65,7 @@ def progress(
     if terrain is None or state.curriculum is None or state.region is None:
         return None, output
     verdict = output.episode["success"]
-    ended = (output.terminated | output.truncated) & ~jnp.isnan(verdict)
+    ended = output.done & ~jnp.isnan(verdict)
     after = regions.advance(state.curriculum, terrain, ended, verdict == 1.0, state.region)
     opened = jnp.full(len(ended), after.opened, jnp.float32)
     return after, output.replace(metrics=output.metrics | {"regions_open": opened})

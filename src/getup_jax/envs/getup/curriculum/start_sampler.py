@@ -66,7 +66,7 @@ def draw_starts(
     progress: regions.Curriculum | None,
     levels: jax.Array | None = None,
 ) -> Draw:
-    """Starts of B = num_envs episodes; learned is the focus of `focus.py`, None: even draws.
+    """Starts of B = num_envs episodes; learned: see start_prioritisation.py, None: even draws.
 
     levels are those of `assist.py`: starts with the hand are drawn where it is about to let go.
     Their curves are those of the styles, see `with_curves`.

@@ -1,8 +1,8 @@
 """How far the lying starts on irregular ground are below the beginning of their curves.
 
 A rag-doll may come to rest with its head down the slope: then its neck is below the curve, and it
-has to rise over feet that lie higher. `focus.py` follows such starts apart: a policy that gets up
-from three in four of the others gets up from one in five of them.
+has to rise over feet that lie higher. `start_prioritisation.py` follows such starts apart: a policy
+that gets up from three in four of the others gets up from one in five of them.
 """
 
 from __future__ import annotations
