@@ -34,10 +34,10 @@ from getup_jax.training.run import run
 _GETUP = (
     "network.mirror=false",
     "prior.mirror=false",
-    "task.assist=0",
-    "task.clip_start=0.2",
-    "task.focus=0",
-    "task.short_share=0",
+    "curriculum.assistive_wrench=0",
+    "curriculum.reference_start=0.2",
+    "curriculum.prioritisation=0",
+    "curriculum.short_share=0",
     "ppo.action_std=[0.2,0.2]",
 )
 Values = dict[str, np.ndarray]  # measure -> [N], one number an episode, larger is better
@@ -55,7 +55,7 @@ class Case:
 CASES = {
     "flat": Case("flat", _GETUP, 280),
     "terrain": Case("terrain", (*_GETUP, "terrain.curriculum=none"), 400),
-    "walk": Case("composite_walk_location", ("composite.rehearse=false",), 64),
+    "walk": Case("composite_walk_location", ("composite.warm_start=false",), 64),
 }
 
 

@@ -22,7 +22,8 @@ from getup_jax.runtime.checkpoint import CHECKPOINTS, save_learner
 SMALL = dataclasses.replace(
     CONFIG,
     network=NetworkConfig(hidden_sizes=(8,)),
-    task=dataclasses.replace(CONFIG.task, stand_time_s=1.5, stand_start=1.0, clip_start=0.0),
+    task=dataclasses.replace(CONFIG.task, stand_time_s=1.5, stand_start=1.0),
+    curriculum=None,
 )
 
 

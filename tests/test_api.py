@@ -64,7 +64,7 @@ def test_training_episodes_are_asked_for(policy):
     env = gj.make_env(policy, num_envs=2, training=True)
     assert env.config == policy.config
     assert env.reset().observation.shape == (2, env.observation_size)
-    assert gj.make_env(policy, scenario=gj.Scenario(episodes=2)).config.task.clip_start == 0.0
+    assert gj.make_env(policy, scenario=gj.Scenario(episodes=2)).config.curriculum is None
 
 
 def test_importing_the_package_imports_nothing_heavy():

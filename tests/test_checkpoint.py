@@ -24,8 +24,8 @@ from getup_jax.runtime.checkpoint import export_policy, load_policy, restore_lea
 from getup_jax.runtime.pytree_store import CheckpointError, from_nested
 
 
-def save(folder: Path, iteration: int, keep: int = 2, width: int = 8) -> Path:
-    config = load.load_config(None, [f"train.keep={keep}", "seed=5"])
+def save(folder: Path, iteration: int, keep: int = 2, width: int = 8, also=()) -> Path:
+    config = load.load_config(None, [f"train.keep={keep}", "seed=5", *also])
     prior, critic = {"decoder": jnp.ones((2, 2))}, {"critic": jnp.full(3, 7.0)}
     item = {"policy": make_policy(iteration, width), "prior": prior, "critic": critic}
     state = make_state(iteration, width)
@@ -445,7 +445,11 @@ def test_export_copies_only_the_policy(saved, tmp_path):
         restore_learner(exported, make_state(0))
 
 
-def test_an_exported_policy_names_no_folder_of_this_machine(saved, tmp_path):
+def test_an_exported_policy_names_no_folder_of_this_machine(tmp_path):
+    states, other = tmp_path / "states", tmp_path / "other"
+    saved = tmp_path / "run"
+    also = [f"curriculum.archive={states}", f"train.init_from={other}"]
+    save(saved / "checkpoints", 3, also=also)
     exported = export_policy(saved, tmp_path / "flat")
     content = b"".join(p.read_bytes() for p in exported.rglob("*") if p.is_file())
     assert str(saved).encode() not in content

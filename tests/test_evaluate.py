@@ -31,7 +31,7 @@ def run_folder(tmp_path_factory):
 
 def build(config, log, prior=None, choose=None):
     """The tiny task in place of that of the library's motions."""
-    assert (config.task.clip_start, choose) == (0.0, None)
+    assert (config.curriculum, choose) == (None, None)
     return tiny_task(load_character(config.physics), config)
 
 
@@ -89,9 +89,10 @@ def asked(*options: str) -> Scenario:
 
 
 def test_the_config_of_an_evaluation_takes_its_starts_from_the_arguments():
-    config = load_config(None, ["task.start_noise_rad=0.3", "task.clip_start=0.3"])
-    task = getup.evaluation_config(config, asked("--episodes", "7", "--seed", "5")).task
-    assert (task.start_noise_rad, task.clip_start, task.stand_start) == (0.0, 0.0, 0.0)
+    config = load_config(None, ["task.start_noise_rad=0.3", "curriculum.reference_start=0.3"])
+    found = getup.evaluation_config(config, asked("--episodes", "7", "--seed", "5"))
+    task = found.task
+    assert (task.start_noise_rad, found.curriculum, task.stand_start) == (0.0, None, 0.0)
     assert (task.pool_size, task.stand_time_s) == (7, config.task.stand_time_s)
     standing = asked("--start", "standing", "--start-noise", "0.1")
     task = getup.evaluation_config(config, standing).task

@@ -35,12 +35,12 @@ def built(tmp_path_factory):
 
 def test_held_poses_are_those_of_the_starts_and_stand(built):
     task, learner = built
-    lesson = slope_warm_start._held(learner, task.environment, task.world, KEY)
-    height = np.asarray(lesson.observation)[:, task.environment.observer.slices()["features"]][:, 0]
+    demos = slope_warm_start._held(learner, task.environment, task.world, KEY)
+    height = np.asarray(demos.observation)[:, task.environment.observer.slices()["features"]][:, 0]
     assert 16 < len(height) <= 16 * slope_warm_start._HOLD_STEPS // slope_warm_start._LOOK_STEPS
     assert np.ptp(height) < 0.4
     angles = np.asarray(task.world.pool.physics.kinematics.qpos)[:, 7:]
-    gap = np.abs(np.asarray(lesson.target)[:, None] - angles).max(axis=-1).min(axis=1)
+    gap = np.abs(np.asarray(demos.target)[:, None] - angles).max(axis=-1).min(axis=1)
     np.testing.assert_allclose(gap, 0.0, atol=1e-4)
 
 
@@ -50,7 +50,7 @@ def test_the_actor_learns_the_held_poses_and_keeps_the_rest(built, monkeypatch):
     task, learner = built
     policy = learner.init_learner(KEY).policy
     log: list[str] = []
-    slope_warm_start.teach_footing(learner, task.world, policy, KEY, log.append)
+    slope_warm_start.warm_start_on_slopes(learner, task.world, policy, KEY, log.append)
     after, before, flat, slope = (float(word) for word in log[-1].split() if word[0].isdigit())
     assert after < 0.6 * before
     assert flat < after

@@ -12,7 +12,7 @@ from rich.console import Console
 from getup_jax.config import ConfigError
 from getup_jax.runtime.console import Display, count, describe, duration
 from getup_jax.runtime.metric_file import FILE, TIMES, MetricsError, MetricsWriter, read_metrics
-from getup_jax.runtime.metric_log import Journal, means
+from getup_jax.runtime.metric_log import MetricLog, means
 
 
 def write_lines(folder, *iterations: int, resume: int = 0, **metrics: float) -> None:
@@ -146,12 +146,12 @@ def test_means_leave_nan_out():
 
 def test_a_journal_writes_means_and_speed(tmp_path):
     with MetricsWriter(tmp_path) as writer, Display(100, quiet=True) as display:
-        journal = Journal(writer, display, per_iteration=10, done=4)
-        journal.flush(4)
-        journal.add({"rollout/reward": 1.0})
-        journal.add({"rollout/reward": 3.0})
-        journal.flush(6)
-        journal.flush(6)
+        metric_log = MetricLog(writer, display, per_iteration=10, done=4)
+        metric_log.flush(4)
+        metric_log.add({"rollout/reward": 1.0})
+        metric_log.add({"rollout/reward": 3.0})
+        metric_log.flush(6)
+        metric_log.flush(6)
     (row,) = read_metrics(tmp_path)
     assert (row["iteration"], row["steps"], row["rollout/reward"]) == (6, 60, 2.0)
     assert row["steps_per_s"] > 0
@@ -169,7 +169,7 @@ def test_a_journal_writes_means_and_speed(tmp_path):
 )
 def test_a_journal_tells_divergence_from_no_episode(tmp_path, name, value, diverged):
     with MetricsWriter(tmp_path) as writer, Display(1, quiet=True) as display:
-        assert Journal(writer, display, 1, 0).add({name: value}) == ([name] if diverged else [])
+        assert MetricLog(writer, display, 1, 0).add({name: value}) == ([name] if diverged else [])
 
 
 # --- the display

@@ -71,8 +71,8 @@ def test_the_actor_comes_to_name_the_clips_targets(built, monkeypatch):
         return float(np.sqrt(np.mean(np.square(target - targets))))
 
     log: list[str] = []
-    stage = dagger.Stage(built, built.world)
-    after = dagger.rehearse(learner, stage, policy, KEY, log.append)
+    setup = dagger.Setup(built, built.world)
+    after = dagger.warm_start(learner, setup, policy, KEY, log.append)
     assert miss(after) < 0.5 * miss(policy)
     std = learner.model.distribution(after.actor, jnp.zeros_like(observation), jnp.ones(()))[1]
     np.testing.assert_allclose(std, CONFIG.network.initial_std, rtol=0.5)
@@ -133,7 +133,7 @@ def test_over_a_meta_policy_only_the_new_clips_are_learned(built, monkeypatch, t
         gap = built.world.target_scale * (learner.act(policy, observation) - wanted)
         return np.sqrt(np.mean(np.square(gap), axis=0))
 
-    stage = dagger.Stage(built, world, new)
-    after = dagger.rehearse(learner, stage, policy, KEY, lambda text: None)
+    setup = dagger.Setup(built, world, new)
+    after = dagger.warm_start(learner, setup, policy, KEY, lambda text: None)
     assert miss(after)[new].mean() < 0.5 * miss(policy)[new].mean()
     assert miss(after)[~new].mean() < miss(policy)[~new].mean()

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from ground_samples import TERRAIN
-from tiny_task import CONFIG, getups, neutral_prior
+from tiny_task import changed, getups, neutral_prior
 
 from getup_jax.config import NetworkConfig, PPOConfig
 from getup_jax.envs.getup.build import assemble
@@ -22,7 +22,7 @@ from getup_jax.runtime import checkpoint
 from getup_jax.runtime.pytree_store import CheckpointError, to_nested
 
 PPO = PPOConfig(num_envs=8, num_steps=3, epochs=1, minibatch_size=24)
-TASK = dataclasses.replace(CONFIG.task, pool_size=96, focus=0.5)
+SETTINGS = changed(pool_size=96, prioritisation=0.5)
 
 
 def build(config, prior: bool = True):
@@ -35,12 +35,12 @@ def build(config, prior: bool = True):
 def test_a_resumed_run_keeps_the_curriculum_and_goes_on_bit_for_bit(tmp_path, monkeypatch):
     monkeypatch.setattr(region_pool, "cache_dir", lambda: tmp_path)
     terrain = dataclasses.replace(TERRAIN, curriculum="schedule", schedule_steps=32)
-    config = dataclasses.replace(CONFIG, task=TASK, terrain=terrain)
+    config = dataclasses.replace(SETTINGS, terrain=terrain)
     task, learner = build(config)
     begin, iterate = jax.jit(learner.init), jax.jit(learner.iteration)
     state, metrics = iterate(task.world, begin(task.world, jax.random.PRNGKey(0)))
     assert float(metrics["rollout/regions_open"]) == 1.0
-    halfway = state.environment.curriculum
+    halfway = state.environment.curriculum.regions
     assert (int(halfway.steps), int(halfway.opened)) == (3, 1)
     item = {"policy": state.learner.policy, "prior": to_dict(task.prior)}
     checkpoint.save_learner(tmp_path / "run", 1, state, config, item, {"steps": 24})
@@ -52,32 +52,33 @@ def test_a_resumed_run_keeps_the_curriculum_and_goes_on_bit_for_bit(tmp_path, mo
     same = jax.tree.map(lambda a, b: np.array_equal(a, b), state, restored)
     assert jax.tree.all(same)
     # the second region opened after four steps of the batch, the third after eight
-    assert int(restored.environment.curriculum.opened) == 3
+    assert int(restored.environment.curriculum.regions.opened) == 3
     assert float(metrics["rollout/regions_open"]) == pytest.approx((2 + 3 + 3) / 3)
 
 
 def test_another_batch_takes_over_the_curriculum_and_what_is_learned(tmp_path, monkeypatch):
     monkeypatch.setattr(region_pool, "cache_dir", lambda: tmp_path)
-    config = dataclasses.replace(CONFIG, task=TASK, terrain=TERRAIN)
+    config = dataclasses.replace(SETTINGS, terrain=TERRAIN)
     task, _ = build(config)
     begin = jax.jit(task.environment.init, static_argnums=2)
     eight = begin(task.world, jax.random.PRNGKey(0), 8)
-    eight = eight.replace(
-        focus=eight.focus + 0.25, curriculum=eight.curriculum.replace(opened=jnp.asarray(3))
+    learned = eight.curriculum
+    learned = learned.replace(
+        success=learned.success + 0.25, regions=learned.regions.replace(opened=jnp.asarray(3))
     )
+    eight = eight.replace(curriculum=learned)
     four = begin(task.world, jax.random.PRNGKey(0), 4)
     taken = with_shared(four, to_nested(eight), "run")
-    assert int(taken.curriculum.opened) == 3
-    np.testing.assert_array_equal(taken.focus, eight.focus)
+    assert int(taken.curriculum.regions.opened) == 3
+    np.testing.assert_array_equal(taken.curriculum.success, learned.success)
     assert taken.time.shape == (4,)
-    flat, _ = build(dataclasses.replace(config, task=dataclasses.replace(TASK, focus=0.0)))
-    other = jax.jit(flat.environment.start)(flat.world, *jnp.zeros((3, 4), jnp.int32))
-    with pytest.raises(CheckpointError, match="run: the array focus"):
-        with_shared(other.replace(curriculum=taken.curriculum), to_nested(eight), "run")
+    other = four.replace(curriculum=four.curriculum.replace(success=None))
+    with pytest.raises(CheckpointError, match=r"run: the array success"):
+        with_shared(other, to_nested(eight), "run")
 
 
 def test_without_a_pose_prior_the_action_is_the_servo_target():
-    config = dataclasses.replace(CONFIG, task=dataclasses.replace(TASK, offset_scale=0.5))
+    config = changed(SETTINGS, offset_scale=0.5)
     task, learner = build(config, prior=False)
     env, world = task.environment, task.world
     assert (env.action_size, env.observation_size) == (49, 352 - 16)

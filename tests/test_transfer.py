@@ -13,7 +13,7 @@ from tiny_task import untrained_prior
 
 from eval_samples import SMALL, make_policy, make_task, save_policy
 from getup_jax.config import Config
-from getup_jax.envs.getup.action_decoder import Units
+from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.build import BuiltTask
 from getup_jax.envs.getup.observation import Observer
 from getup_jax.envs.getup.symmetry import find_symmetry
@@ -43,8 +43,8 @@ def task():
 
 
 @pytest.fixture(scope="module")
-def old(task) -> Units:
-    return Units(untrained_prior(task.environment.character, seed=0), 0.5)
+def old(task) -> ActionDecoder:
+    return ActionDecoder(untrained_prior(task.environment.character, seed=0), 0.5)
 
 
 def samples(rng: np.random.Generator, size: int) -> tuple[jax.Array, jax.Array]:
@@ -53,7 +53,7 @@ def samples(rng: np.random.Generator, size: int) -> tuple[jax.Array, jax.Array]:
 
 
 def test_a_translated_action_has_the_same_servo_target(task, old):
-    new = Units(task.world.prior, 0.25)
+    new = ActionDecoder(task.world.prior, 0.25)
     action, condition = samples(np.random.default_rng(0), 32)
     translated = old.translate(action, condition, new)
     np.testing.assert_allclose(
@@ -63,7 +63,7 @@ def test_a_translated_action_has_the_same_servo_target(task, old):
 
 
 def test_the_latent_is_that_of_the_old_pose_and_not_of_the_offsets(task, old):
-    new = Units(task.world.prior, 0.25)
+    new = ActionDecoder(task.world.prior, 0.25)
     action, condition = samples(np.random.default_rng(1), 8)
     bare = action.at[:, 16:].set(0.0)
     moved = old.translate(action, condition, new) - old.translate(bare, condition, new)
@@ -71,14 +71,14 @@ def test_the_latent_is_that_of_the_old_pose_and_not_of_the_offsets(task, old):
     np.testing.assert_allclose(moved[:, 16:], 2.0 * action[:, 16:], atol=1e-5)
 
 
-def teacher_of(learner: Learner, policy: PolicyState, units: Units) -> Teacher:
+def teacher_of(learner: Learner, policy: PolicyState, decoder: ActionDecoder) -> Teacher:
     return Teacher(
-        learner.model, policy, units, learner.env.observer, learner.env.config.lookahead_s
+        learner.model, policy, decoder, learner.env.observer, learner.env.config.lookahead_s
     )
 
 
 def quickly(monkeypatch, rounds: int = 1) -> None:
-    """Few and small lessons."""
+    """Few and small demonstrations."""
     monkeypatch.setattr(action_distillation, "_ROUNDS", rounds)
     monkeypatch.setattr(action_distillation, "_SAMPLES", 896)
     monkeypatch.setattr(action_regression, "_EPOCHS", 60)
@@ -86,21 +86,21 @@ def quickly(monkeypatch, rounds: int = 1) -> None:
 
 
 @pytest.fixture(scope="module")
-def lesson_memory() -> dict[str, Any]:
+def demo_memory() -> dict[str, Any]:
     return {}
 
 
 @pytest.fixture
-def remembered(lesson_memory, monkeypatch) -> None:
-    """What the old policy sees is watched once for all tests that teach one and the same."""
-    watched = action_regression.watched
+def remembered(demo_memory, monkeypatch) -> None:
+    """What the old policy sees is collected once for all tests that teach one and the same."""
+    collect = action_regression.collect
 
-    def watched_once(*args: Any) -> action_regression.Lesson:
-        if "old" not in lesson_memory:
-            lesson_memory["old"] = watched(*args)
-        return lesson_memory["old"]
+    def collected_once(*args: Any) -> action_regression.Demonstrations:
+        if "old" not in demo_memory:
+            demo_memory["old"] = collect(*args)
+        return demo_memory["old"]
 
-    monkeypatch.setattr(action_regression, "watched", watched_once)
+    monkeypatch.setattr(action_regression, "collect", collected_once)
 
 
 def differences(log: list[str]) -> tuple[float, float, float]:
@@ -112,7 +112,7 @@ def differences(log: list[str]) -> tuple[float, float, float]:
 def test_an_action_that_means_the_same_leaves_the_policy_alone(task):
     learner, policy = make_policy(task, CONFIG)
     log: list[str] = []
-    teacher = teacher_of(learner, policy, learner.env.units(task.world))
+    teacher = teacher_of(learner, policy, learner.env.decoder(task.world))
     own = learner.init_learner(jax.random.PRNGKey(1)).policy
     assert carry_over(learner, task.world, own, teacher, KEY, log.append) is policy
     assert log == []
@@ -155,10 +155,8 @@ def test_the_difference_is_the_root_mean_square_in_degrees(task, old):
     action, condition = samples(np.random.default_rng(2), 4)
     observation = jnp.ones((4, learner.env.observation_size))
     target = old.target(learner.act(policy, observation), condition) + math.radians(3.0)
-    lesson = action_regression.Lesson(observation, action, target, condition)
-    assert action_regression.compare(learner, policy, old, lesson)[0] == pytest.approx(
-        3.0, rel=1e-3
-    )
+    demos = action_regression.Demonstrations(observation, action, target, condition)
+    assert action_regression.compare(learner, policy, old, demos)[0] == pytest.approx(3.0, rel=1e-3)
 
 
 # --- mirror images
@@ -169,7 +167,7 @@ def mirrored(task):
     """The task with a prior that has mirror images, and so with a symmetry."""
     character = task.environment.character
     prior = untrained_prior(character, seed=1, mirrored=True)
-    symmetry = find_symmetry(CONFIG, character, task.environment.observer, prior)
+    symmetry = find_symmetry(character, task.environment.observer, prior)
     env = dataclasses.replace(task.environment, symmetry=symmetry)
     return BuiltTask(env, task.world.replace(prior=prior), prior, task.getups)
 
@@ -190,7 +188,7 @@ def observed(policy: PolicyState, learner: Learner, seed: int = 0) -> PolicyStat
 
 
 @pytest.mark.parametrize("was_mirrored", [False, True])
-def test_a_policy_is_taught_to_networks_with_and_without_mirror_images(
+def test_a_policy_is_distilled_into_networks_with_and_without_mirror_images(
     mirrored, was_mirrored, monkeypatch
 ):
     quickly(monkeypatch)
@@ -201,7 +199,7 @@ def test_a_policy_is_taught_to_networks_with_and_without_mirror_images(
     output = {**policy.actor["params"]["output"], "kernel": kernel}
     actor = {**policy.actor, "params": {**policy.actor["params"], "output": output}}
     policy = dataclasses.replace(policy, actor=actor)
-    teacher = teacher_of(taught_before, policy, learner.env.units(mirrored.world))
+    teacher = teacher_of(taught_before, policy, learner.env.decoder(mirrored.world))
     log: list[str] = []
     taught = carry_over(learner, mirrored.world, own, teacher, KEY, log.append)
     after, before, _ = differences(log)
@@ -224,7 +222,7 @@ def test_what_a_checkpoint_was_trained_with_is_read_off_it(tmp_path, mirrored, t
         teacher = make_teacher(CONFIG, learner, mirrored.world, loaded, own)
         assert (teacher.model.symmetry is not None) == expected
         assert teacher.fits(learner) == expected
-        assert teacher.units.prior.mirrored == built.prior.mirrored
+        assert teacher.decoder.prior.mirrored == built.prior.mirrored
         jax.tree.map(np.testing.assert_array_equal, teacher.policy.actor, loaded.policy["actor"])
 
 
@@ -252,7 +250,7 @@ def test_a_learner_goes_on_only_with_its_own_networks(tmp_path, mirrored, task):
 def without_prior(task: BuiltTask) -> BuiltTask:
     env = task.environment
     observer = Observer.of(env.character, 4, 49)
-    symmetry = find_symmetry(CONFIG, env.character, observer, None)
+    symmetry = find_symmetry(env.character, observer, None)
     env = dataclasses.replace(env, observer=observer, symmetry=symmetry, latent_size=0)
     return BuiltTask(env, task.world.replace(prior=None), None, task.getups)
 
@@ -294,7 +292,9 @@ LONGER = dataclasses.replace(
 )
 
 
-def test_networks_of_other_sizes_that_see_more_of_the_curve_are_taught(tmp_path, task, monkeypatch):
+def test_other_sizes_that_see_more_of_the_curve_are_distilled_into(
+    tmp_path, task, monkeypatch
+):
     quickly(monkeypatch, rounds=2)
     loaded = loaded_from(tmp_path, task, CONFIG)
     built = make_task(LONGER)

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from getup_jax.config import DiscriminatorConfig
-from getup_jax.rl import normalize
 from getup_jax.rl.discriminator import Discriminator, Pairs, gradient_penalty, hinge_loss, reward
 
 CONFIG = DiscriminatorConfig(
@@ -93,21 +90,3 @@ def test_statistics_are_those_of_both_kinds(trained):
     # two kinds 4 apart with a spread of 2: 2^2 + 2^2
     assert_allclose(state.statistics.variance, 8.0, rtol=0.05)
     assert float(state.statistics.count) == 30 * 2 * N * F
-
-
-def test_memory_is_half_of_what_is_learned_from_and_is_renewed_slowly():
-    config = dataclasses.replace(CONFIG, memory=200)
-    model = Discriminator(config)
-    state = model.init(jax.random.key(0), F, D)
-    assert state.memory.shape == (200, F, D)
-    ones = jnp.ones((N, F, D))
-    seen, memory = model._remember(state, ones, jax.random.key(1))
-    assert_allclose(seen, 1.0)
-    assert_allclose(memory, 1.0)  # the first windows fill it
-    known = normalize.update(state.statistics, ones.reshape(-1, D))
-    state = dataclasses.replace(state, memory=memory, statistics=known)
-    seen, memory = model._remember(state, 2.0 * ones, jax.random.key(2))
-    assert sorted(np.unique(seen)) == [1.0, 2.0]
-    assert_allclose(np.mean(seen), 1.5)
-    assert_allclose(np.mean(memory), 1.01, atol=1e-3)  # 2 of 200
-    assert Discriminator(CONFIG).init(jax.random.key(0), F, D).memory is None

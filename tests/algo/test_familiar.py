@@ -14,7 +14,7 @@ from tiny_composite import COMPOSITE, CONFIG, tiny_composite
 from getup_jax.config import CompositeConfig, ConfigError
 from getup_jax.core import quaternion
 from getup_jax.envs.composite.meta.chain import with_meta
-from getup_jax.envs.composite.meta.observation_substitution import familiar, make_familiar
+from getup_jax.envs.composite.meta.observation_substitution import make_substitution, substitute
 from getup_jax.physics.character import load_character
 from getup_jax.rl.learner import make_learner
 from getup_jax.runtime.checkpoint import save_learner
@@ -47,9 +47,9 @@ def moved(history: np.ndarray, yaw: float, offset: np.ndarray) -> np.ndarray:
 
 def test_what_it_knows_it_sees_as_it_is(built, arm):
     history = np.asarray(built.world.starts.history)
-    known = make_familiar(history, arm)
+    known = make_substitution(history, arm)
     elsewhere = moved(history[:5], 2.0, np.array([3.0, -1.0, 0.0]))
-    seen = np.asarray(familiar(known, jnp.asarray(elsewhere)))
+    seen = np.asarray(substitute(known, jnp.asarray(elsewhere)))
     np.testing.assert_array_equal(seen[:, :, ~arm], elsewhere[:, :, ~arm])
     assert_allclose(seen, elsewhere, atol=1e-4)
 
@@ -58,12 +58,12 @@ def test_another_arm_is_shown_where_its_clip_has_it(built, arm):
     """Whatever the arm does, and with legs that are a little off."""
     rng = np.random.default_rng(0)
     history = np.asarray(built.world.starts.history)
-    known = make_familiar(history, arm)
+    known = make_substitution(history, arm)
     elsewhere = moved(history[:5], -1.0, np.array([0.0, 2.0, 0.0]))
     other = elsewhere.copy()
     other[:, :, arm] += rng.normal(0.0, 0.5, other[:, :, arm].shape)
     other[:, :, 1:, :3] += rng.normal(0.0, 1e-4, other[:, :, 1:, :3].shape)
-    seen = np.asarray(familiar(known, jnp.asarray(other, jnp.float32)))
+    seen = np.asarray(substitute(known, jnp.asarray(other, jnp.float32)))
     assert_allclose(seen[:, :, arm], elsewhere[:, :, arm], atol=1e-3)
     assert_allclose(seen[:, :, ~arm], other[:, :, ~arm], atol=1e-6)
 
@@ -71,7 +71,7 @@ def test_another_arm_is_shown_where_its_clip_has_it(built, arm):
 def test_the_root_is_always_where_it_is(built):
     history = jnp.asarray(built.world.starts.history[:3])
     everything = np.ones(history.shape[2], bool)
-    seen = familiar(make_familiar(history, everything), history)
+    seen = substitute(make_substitution(history, everything), history)
     assert_allclose(seen[:, :, 0], history[:, :, 0])
 
 

@@ -113,19 +113,19 @@ def test_a_meta_action_reaches_the_pose_that_its_own_policy_would(trained):
     assert front.control_dt == env.engine.control_dt
 
 
-@pytest.mark.parametrize("rehearse", [True, False])
+@pytest.mark.parametrize("warm", [True, False])
 @pytest.mark.parametrize("has_meta", [True, False])
-def test_a_job_has_the_meta_policy_and_the_rehearsal(trained, monkeypatch, has_meta, rehearse):
+def test_a_job_has_the_meta_policy_and_the_warm_start(trained, monkeypatch, has_meta, warm):
     built, _, _, path = trained
     config = _config(path) if has_meta else CONFIG
-    composite = dataclasses.replace(config.composite, rehearse=rehearse)
+    composite = dataclasses.replace(config.composite, warm_start=warm)
     env = dataclasses.replace(built.environment, config=composite)
     made = dataclasses.replace(built, environment=env)
     monkeypatch.setattr(run, "build_composite", lambda *_: made)
     monkeypatch.setattr("getup_jax.envs.composite.meta.chain.load_clips", lambda *_: built.clips)
     log: list[str] = []
     _, job = run.build_composite_job(config, log.append)
-    assert (job.prepare is not None) == rehearse
+    assert (job.prepare is not None) == warm
     assert any(f"meta policy: {path}" in line for line in log) == has_meta
     assert (job.learner.env is env) != has_meta
 

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from tiny_task import CONFIG, tiny_task
+from tiny_task import CONFIG, changed, tiny_task
 
 from getup_jax.config import NetworkConfig, PhysicsConfig, PPOConfig
 from getup_jax.core.types import PropCommand
@@ -22,14 +22,18 @@ from support.scanned import recorded_of, scan_run
 
 SIZE, STEPS = 8, 6
 # a hand that lifts, and episodes that end after three steps of little reward
-TASK = dataclasses.replace(
-    CONFIG.task, stand_start=0.0, focus=0.9, assist=0.5, assist_share=0.9, terminate_after_s=0.1
+SETTINGS = changed(
+    stand_start=0.0,
+    prioritisation=0.9,
+    assistive_wrench=0.5,
+    assisted_share=0.9,
+    terminate_after_s=0.1,
 )
 
 
 @pytest.fixture(scope="module")
 def learner_and_world():
-    config = dataclasses.replace(CONFIG, task=dataclasses.replace(TASK, terminate_reward=1.0))
+    config = changed(SETTINGS, terminate_reward=1.0)
     task = tiny_task(load_character(config.physics), config)
     ppo = PPOConfig(num_envs=SIZE, num_steps=STEPS, minibatch_size=SIZE * STEPS)
     network = NetworkConfig(hidden_sizes=(16,))

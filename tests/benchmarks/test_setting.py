@@ -28,8 +28,8 @@ def test_every_shipped_config_is_made_in_any_size(monkeypatch, name):
 
 
 def test_without_options_the_batch_is_the_configs_and_a_round_is_short(monkeypatch):
-    config, said = made(monkeypatch, "ppo.num_envs=96", "task.assist=0.25")
-    assert (config.ppo.num_envs, config.ppo.num_steps, config.task.assist) == (96, 8, 0.25)
+    config, said = made(monkeypatch, "ppo.num_envs=96", "task.limp_share=0.25")
+    assert (config.ppo.num_envs, config.ppo.num_steps, config.task.limp_share) == (96, 8, 0.25)
     assert said == []
 
 

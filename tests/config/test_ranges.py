@@ -12,6 +12,7 @@ from getup_jax.config import (
     CompositeConfig,
     Config,
     ConfigError,
+    CurriculumConfig,
     GroupConfig,
     PriorConfig,
     TerrainConfig,
@@ -23,7 +24,7 @@ from getup_jax.config.ranges import Range, check_numbers, number, range_of
 
 GROUP = GroupConfig(links=("full",), clips=("walk",))
 # every optional section is in one of them, so that the walk comes to all of them
-GROUND = Config(prior=PriorConfig(), terrain=TerrainConfig())
+GROUND = Config(prior=PriorConfig(), curriculum=CurriculumConfig(), terrain=TerrainConfig())
 GROUPS = Config(composite=CompositeConfig(groups={"body": GROUP}, weights={"body": 1.0}))
 ODD = (0, -1, 1e300, math.inf, -math.inf, math.nan, 10**4000, "many", True, None, [], {})
 

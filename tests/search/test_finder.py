@@ -8,7 +8,7 @@ import pytest
 
 from getup_jax.cli import main
 from getup_jax.cli.search import search_config
-from getup_jax.config import Config, ConfigError, TerrainConfig
+from getup_jax.config import Config, ConfigError, CurriculumConfig, TaskConfig, TerrainConfig
 from getup_jax.envs.getup.build import BuiltTask
 from getup_jax.trajectory_search.finder import Finder
 from getup_jax.trajectory_search.sampling import Settings
@@ -51,12 +51,11 @@ def test_the_same_seed_finds_the_same(path, resting):
 
 
 def test_the_search_uses_lying_starts_on_flat_ground():
-    config = Config()
-    config = dataclasses.replace(
-        config, task=dataclasses.replace(config.task, clip_start=0.5, paths="somewhere", focus=0.5)
+    config = Config(
+        task=TaskConfig(limp_share=0.5), curriculum=CurriculumConfig(prioritisation=0.5)
     )
-    task = search_config(config, seed=1).task
-    assert (task.stand_start, task.clip_start, task.paths, task.focus) == (0.0, 0.0, None, 0.0)
+    found = search_config(config, seed=1)
+    assert (found.task.stand_start, found.task.limp_share, found.curriculum) == (0.0, 0.0, None)
     with pytest.raises(ConfigError, match="flat ground"):
         search_config(dataclasses.replace(config, terrain=TerrainConfig()), seed=1)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tiny_task import CONFIG, LATENT, untrained_prior
 
-from getup_jax.envs.getup.action_decoder import Units
+from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.rewards import natural
 
 SCALE = 0.25
@@ -15,8 +15,8 @@ LIMIT = CONFIG.task.offset_limit_rad
 
 
 @pytest.fixture(scope="module")
-def units(character) -> Units:
-    return Units(untrained_prior(character), SCALE)
+def units(character) -> ActionDecoder:
+    return ActionDecoder(untrained_prior(character), SCALE)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def test_without_limp_bodies_starts_on_a_plane_have_no_offsets(units, angles, co
 
 
 def test_offsets_that_do_nothing_are_none(character, angles, condition):
-    without = Units(untrained_prior(character), 0.0)
+    without = ActionDecoder(untrained_prior(character), 0.0)
     action = np.asarray(without.action(angles, angles, condition))
     np.testing.assert_array_equal(action[:, LATENT:], 0.0)
     assert np.isfinite(action).all()
@@ -85,7 +85,7 @@ def test_offsets_that_do_nothing_are_none(character, angles, condition):
 
 def test_without_a_prior_the_pose_is_held_whatever_the_sum(character, angles, condition):
     neutral = jnp.asarray(character.neutral_qpos[7:], jnp.float32)
-    bare = Units(None, SCALE, neutral)
+    bare = ActionDecoder(None, SCALE, neutral)
     np.testing.assert_allclose(
         bare.target(bare.hold(angles, condition, 0.1), condition), angles, atol=1e-5
     )

@@ -1,4 +1,4 @@
-"""The helping hand: its wrench, its levels, and that its episodes do not count as success."""
+"""The assistive wrench, its levels, and that its episodes do not count as success."""
 
 import dataclasses
 
@@ -8,12 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tiny_task import CONFIG, tiny_task
+from tiny_task import changed, tiny_task
 
-from getup_jax.config import ConfigError, TaskConfig
+from getup_jax.config import ConfigError, CurriculumConfig
 from getup_jax.core.types import Kinematics
 from getup_jax.envs.getup.curriculum import assistive_wrench, start_prioritisation
-from getup_jax.envs.getup.curriculum.start_sampler import draw_starts, whole_episodes
+from getup_jax.envs.getup.curriculum.state import CurriculumState
 from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
 from getup_jax.motion.getup.features import FeatureLinks, features
 
@@ -117,8 +117,8 @@ def test_levels_fall_with_success_rise_with_failure_and_stay_in_range():
     cell = (jnp.asarray([0, 1, 1, 2, 3]),)
     ended = jnp.asarray([True, True, True, False, True])
     success = jnp.asarray([False, True, True, True, True])
-    after = np.asarray(assistive_wrench.update(level, cell, ended, success, (0.03, 0.01)))
-    np.testing.assert_allclose(after, [1.0, 0.44, 0.5, 0.0], atol=1e-6)
+    after = np.asarray(assistive_wrench.update(level, cell, ended, success))
+    np.testing.assert_allclose(after, [1.0, 0.46, 0.5, 0.0], atol=1e-6)
 
 
 def test_the_engine_carries_the_weight_for_one_step_only(character, engine):
@@ -149,8 +149,7 @@ def test_the_engine_carries_the_weight_for_one_step_only(character, engine):
 
 @pytest.fixture(scope="module")
 def helped(character):
-    task = dataclasses.replace(CONFIG.task, focus=0.9, assist=0.5)
-    return tiny_task(character, dataclasses.replace(CONFIG, task=task))
+    return tiny_task(character, changed(prioritisation=0.9, assistive_wrench=0.5))
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +161,7 @@ def first(helped):
 
 def test_half_of_the_starts_get_the_hand_and_standing_ones_never(first, character):
     state = first
-    assert state.assist.shape == state.focus.shape
+    assert state.curriculum.wrench.shape == state.curriculum.success.shape
     lift, standing = np.asarray(state.lift), np.asarray(state.kind) == STANDING
     assert set(np.unique(lift).round(3)) == {0.0, np.float32(0.5 * character.weight).round(3)}
     assert (lift[standing] == 0).all()
@@ -175,68 +174,48 @@ def test_success_with_the_hand_lowers_its_level_and_is_not_counted(helped, first
     # all stand at the end of an episode that began on the way, half of them with the hand
     standing = env.start(world, state.getup, jnp.full(count, STANDING), jnp.zeros(count, jnp.int32))
     lift = jnp.where(jnp.arange(count) % 2 == 0, 100.0, 0.0)
+    learned = state.curriculum
+    learned = learned.replace(success=learned.success + 0.5, wrench=learned.wrench * 0.5)
     state = standing.replace(
-        key=state.key, focus=state.focus + 0.5, assist=state.assist * 0.5, lift=lift,
+        key=state.key, curriculum=learned, lift=lift,
         kind=jnp.full(count, CLIP), time=standing.duration + env.config.stand_time_s,
     )  # fmt: skip
     after, output = jax.jit(env.step)(world, state, state.action)
     assert bool(output.truncated.all())
     np.testing.assert_array_equal(np.isnan(output.episode["clip_success"]), lift > 0)
-    focused, levels = np.asarray(after.focus), np.asarray(after.assist)
+    success, levels = np.asarray(after.curriculum.success), np.asarray(after.curriculum.wrench)
     alone, with_hand = (np.asarray(state.getup)[np.asarray(lift) == x] for x in (0.0, 100.0))
-    for style in range(focused.shape[1]):
-        rises = focused[CLIP, style] > 0.5
+    for style in range(success.shape[1]):
+        rises = success[CLIP, style] > 0.5
         assert rises.sum() == (style in alone)
         lowered = levels[CLIP, style] < 0.5
         assert lowered.sum() == (style in with_hand)
-    assert (np.asarray(after.focus)[:CLIP] == 0.5).all()
+    assert (success[:CLIP] == 0.5).all()
 
 
-def test_it_lets_go_in_time(helped, first):
-    """After .1 s of an episode: three control steps of 1 / 30 s."""
-    env = helped.environment
-    env = dataclasses.replace(env, config=dataclasses.replace(env.config, assist_s=0.1))
-    steps = np.arange(6)
-    state = env.start(helped.world, jnp.zeros(6, int), jnp.full(6, LYING), jnp.zeros(6, int))
-    # half way up the curve, where the body still lies
-    state = state.replace(
-        lift=jnp.full(6, 100.0),
-        time=0.5 * state.duration,
-        record=state.record.replace(rise_steps=jnp.asarray(steps - steps // 2, jnp.int32),
-                                    stand_steps=jnp.asarray(steps // 2, jnp.int32)),
-    )  # fmt: skip
-    wrench = np.asarray(env._hand(helped.world, state))
-    np.testing.assert_array_equal(np.abs(wrench).max(axis=-1) > 1.0, steps < 3)
+def test_the_wrench_needs_the_prioritisation_whose_cells_it_has():
+    with pytest.raises(ConfigError, match=r"curriculum\.prioritisation: .*assistive_wrench"):
+        CurriculumConfig(assistive_wrench=0.5)
 
 
-def test_evaluation_has_no_hand(helped):
-    assert whole_episodes(helped.environment.config).assist == 0.0
-
-
-def test_the_hand_needs_the_focus_whose_cells_it_has():
-    with pytest.raises(ConfigError, match=r"task\.focus: .*task\.assist"):
-        TaskConfig(assist=0.5)
-
-
-def test_the_hand_lets_go_after_some_time_and_its_level_moves():
-    with pytest.raises(ConfigError, match=r"task\.assist_s: .*more than 0"):
-        TaskConfig(assist_s=0.0)
-    with pytest.raises(ConfigError, match=r"task\.assist_rates\[1\]: .*more than 0"):
-        TaskConfig(assist_rates=(0.02, 0.0))
+def with_settings(helped, **settings):
+    """Its curriculum with other settings."""
+    aids = helped.environment.curriculum
+    return dataclasses.replace(aids, config=dataclasses.replace(aids.config, **settings))
 
 
 def test_what_an_episode_starts_from_is_drawn_independently(helped):
     # one key used twice would give the hand, or the short episodes, to some of the styles only
-    task = dataclasses.replace(helped.environment.config, short_share=0.5)
-    learned = start_prioritisation.first(helped.world.pool)
-    drawn = draw_starts(task, helped.world, jax.random.PRNGKey(1), 8000, learned, None)
+    state = CurriculumState(start_prioritisation.first(helped.world.pool))
+    aids = with_settings(helped, short_share=0.5)
+    drawn = aids.draw(helped.world, state, jax.random.PRNGKey(1), 8000)
     lying = np.asarray(drawn.kind) != STANDING
     parts = {
         "style": np.asarray(drawn.getup)[lying],
         "row": np.asarray(drawn.row)[lying],
         "kind": np.asarray(drawn.kind)[lying],
         "short": np.isfinite(np.asarray(drawn.lasts))[lying],
-        "hand": np.asarray(drawn.helped)[lying],
+        "hand": np.asarray(drawn.assisted)[lying],
     }
     for name in ("short", "hand"):
         for other in {"style", "row", "kind", "short", "hand"} - {name}:
@@ -245,12 +224,13 @@ def test_what_an_episode_starts_from_is_drawn_independently(helped):
 
 
 def test_starts_with_the_hand_have_a_frontier_of_their_own(helped):
-    task = dataclasses.replace(helped.environment.config, focus=0.999)
     # alone the first style rises from lying, with the hand the second one does
     learned = start_prioritisation.first(helped.world.pool).at[CLIP].set(1.0).at[LYING, 0].set(1.0)
     levels = jnp.ones_like(learned).at[CLIP].set(0.0).at[LYING, 1].set(0.0)
-    drawn = draw_starts(task, helped.world, jax.random.PRNGKey(2), 4000, learned, None, levels)
-    lying, hand = np.asarray(drawn.kind) == LYING, np.asarray(drawn.helped)
+    aids = with_settings(helped, prioritisation=0.999)
+    state = CurriculumState(learned, levels)
+    drawn = aids.draw(helped.world, state, jax.random.PRNGKey(2), 4000)
+    lying, hand = np.asarray(drawn.kind) == LYING, np.asarray(drawn.assisted)
     style = np.asarray(drawn.getup)
     assert (style[lying & ~hand] == 1).mean() > 0.99
     assert (style[lying & hand] == 0).mean() > 0.99

@@ -11,12 +11,10 @@ from scipy.spatial.transform import Rotation
 from tiny_composite import CONFIG, clips, tiny_composite
 
 from getup_jax.config import ConfigError
-from getup_jax.core.types import StepOutput
 from getup_jax.envs.composite.build import action_centre, action_scale, assemble_composite
 from getup_jax.envs.composite.link_frames import FRAMES, LINK_STATE, observe
 from getup_jax.envs.composite.reference_state_init import resampled
 from getup_jax.envs.composite.reference_windows import window_at
-from getup_jax.envs.getup.curriculum import cuts
 from getup_jax.physics.character import load_character
 
 SIZE = 16
@@ -195,55 +193,6 @@ def test_a_goals_mistake_names_its_key(character):
         tiny_composite(character, dataclasses.replace(CONFIG, composite=composite))
 
 
-def test_cuts_end_a_share_of_the_episodes_and_no_failed_one(built, steps):
-    """On average after 2 dt: half of those that go on, drawn anew for each key."""
-    _, _, outputs = steps
-    env = built.environment
-    cut = dataclasses.replace(env, config=dataclasses.replace(env.config, cut_s=2 / 30))
-    many = outputs[0].replace(terminated=jnp.arange(4000) < 1000, truncated=jnp.zeros(4000, bool))
-    found = cut._cut(None, many, jax.random.key(0))
-    assert not np.any(found.truncated[:1000])
-    assert_allclose(np.mean(found.truncated[1000:]), 0.5, atol=0.03)
-    assert env._cut(None, many, jax.random.key(0)) is many
-
-
-def test_the_time_to_a_cut_follows_success():
-    """It grows without failures, is kept where a tenth fail, and shrinks where more do."""
-    ended, none, first = jnp.ones(1000, bool), jnp.zeros(1000, bool), jnp.float32(1.0)
-    grown = cuts.followed(first, none, ended, 0.5, 10.0)
-    assert_allclose(grown, np.exp(0.1), rtol=1e-6)
-    tenth = jnp.arange(1000) < 100
-    assert_allclose(cuts.followed(first, tenth, ~tenth, 0.5, 10.0), 1.0, rtol=1e-6)
-    assert_allclose(cuts.followed(first, none, none, 0.5, 10.0), 1.0)
-    assert_allclose(cuts.followed(first, ended, none, 0.5, 10.0), 0.5)  # the least
-    assert_allclose(cuts.followed(jnp.float32(9.9), none, ended, 0.5, 10.0), 10.0)
-
-
-def test_a_growing_cut_is_kept_in_the_state_and_logged(built):
-    env = built.environment
-    config = dataclasses.replace(env.config, cut_s=0.5, cut_grows=True)
-    env = dataclasses.replace(env, config=config)
-    state = env.init(built.world, jax.random.key(0), 4)
-    assert float(state.cut_s) == 0.5
-    action = jnp.zeros((4, env.action_size))
-    after, stepped = jax.eval_shape(env.step, built.world, state, action)
-    assert jax.tree.structure(after) == jax.tree.structure(state)  # a scan carries it
-    assert stepped.metrics["cut_s"].shape == (4,)
-    output = StepOutput(
-        observation=state.observation,
-        final_observation=state.observation,
-        reward=jnp.zeros((4, 2)),
-        terminated=jnp.zeros(4, bool),
-        truncated=jnp.ones(4, bool),
-        metrics={},
-        episode={},
-    )
-    mean_s, metrics = env._next_cut(state.cut_s, output)
-    assert_allclose(mean_s, 0.5 * np.exp(4e-4), rtol=1e-6)
-    assert_allclose(metrics["cut_s"], mean_s)
-    assert metrics["cut_s"].shape == (4,)
-
-
 def test_actions_move_a_hinge_as_much_as_its_clips_do(character):
     config = dataclasses.replace(CONFIG.composite, action_range="clips", action_scale=0.5)
     found = action_scale(config, character, clips(character))
@@ -272,8 +221,8 @@ def test_mixed_starts_look_like_the_clips_of_every_group(character):
         assert bool(jnp.max(gap) < 1e-5) is same
 
 
-def test_what_is_rehearsed_is_of_every_groups_clips_wherever_episodes_start(character):
-    composite = dataclasses.replace(CONFIG.composite, rehearse=True)
+def test_what_a_warm_start_learns_is_of_every_groups_clips_wherever_episodes_start(character):
+    composite = dataclasses.replace(CONFIG.composite, warm_start=True)
     built = tiny_composite(character, dataclasses.replace(CONFIG, composite=composite))
     knee, arm = character.joint("shin_l_flex"), character.joint("arm_r_abd")
     own = clips(character)["upper"][0].qpos[:, 7 + arm]

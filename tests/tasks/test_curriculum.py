@@ -7,7 +7,7 @@ import pytest
 
 from getup_jax.config import TerrainConfig
 from getup_jax.envs.getup.curriculum.regions import (
-    Curriculum,
+    RegionProgress,
     advance,
     by_region,
     draw_region,
@@ -17,7 +17,9 @@ from getup_jax.envs.getup.curriculum.regions import (
 CONFIG = TerrainConfig(unlock_successes=3)
 
 
-def run(state: Curriculum, config: TerrainConfig, events: list[tuple[int, int]]) -> Curriculum:
+def run(
+    state: RegionProgress, config: TerrainConfig, events: list[tuple[int, int]]
+) -> RegionProgress:
     """One step for each (successes, region), in a batch of four."""
     for count, region in events:
         success = jnp.arange(4) < count
@@ -26,7 +28,7 @@ def run(state: Curriculum, config: TerrainConfig, events: list[tuple[int, int]])
     return state
 
 
-def numbers(state: Curriculum) -> tuple[int, int, int]:
+def numbers(state: RegionProgress) -> tuple[int, int, int]:
     return int(state.opened), int(state.successes), int(state.steps)
 
 
@@ -74,13 +76,13 @@ def test_open_regions_are_visited_evenly(opened):
     np.testing.assert_array_equal(share[opened:], 0.0)
 
 
-def shares(state: Curriculum, focus: float) -> np.ndarray:
+def shares(state: RegionProgress, share: float) -> np.ndarray:
     draw = jax.jit(draw_region, static_argnums=(2, 3))
-    region = draw(state, jax.random.PRNGKey(0), 4000, focus)
+    region = draw(state, jax.random.PRNGKey(0), 4000, share)
     return np.bincount(region, minlength=4) / 4000
 
 
-def test_regions_that_fail_are_visited_more_often_with_focus():
+def test_regions_that_fail_are_visited_more_often_with_prioritisation():
     rate = jnp.array([1.0, 0.5, 0.0, 0.0])
     state = first(CONFIG).replace(opened=jnp.asarray(3, jnp.int32), rate=rate)
     share = shares(state, 0.9)  # 0.1, 0.55 and 1, and the fourth is closed

@@ -9,10 +9,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from tiny_task import CONFIG, tiny_task
+from tiny_task import CONFIG, changed, tiny_task
 
-from getup_jax.config import ConfigError, TaskConfig
-from getup_jax.envs.getup.curriculum.start_sampler import draw_starts, whole_episodes, with_curves
+from getup_jax.config import ConfigError, CurriculumConfig, TaskConfig
+from getup_jax.envs.getup.curriculum.start_sampler import draw_starts, with_curves
+from getup_jax.envs.getup.curriculum.state import CurriculumState
 from getup_jax.envs.getup.drawn_curves import (
     NOISE_RMS,
     Curve,
@@ -30,7 +31,8 @@ from getup_jax.motion.getup.curves import NUM_POINTS
 B = 6000
 SUPINE, LATE, PRONE, SIDE, OTHER_SIDE = range(5)
 KEY = jax.random.PRNGKey(3)
-ALL = TaskConfig(drawn_share=1.0)
+ALL = CurriculumConfig(drawn_curves=1.0)
+MATCH_RAD = TaskConfig().curve_match_rad
 
 
 class Styles(NamedTuple):
@@ -63,9 +65,9 @@ LIBRARY = Styles(
 )
 
 
-def draw(config: TaskConfig = ALL, kind: int = LYING, library=LIBRARY, key=KEY) -> Curve:
+def draw(config: CurriculumConfig = ALL, kind: int = LYING, library=LIBRARY, key=KEY) -> Curve:
     styles = jnp.arange(B) % len(library.duration)
-    return draw_curves(config, library, key, styles, jnp.full(B, kind))
+    return draw_curves(config, MATCH_RAD, library, key, styles, jnp.full(B, kind))
 
 
 def of(curve: Curve, number: int) -> Curve:
@@ -141,7 +143,7 @@ def test_the_first_angles_stay_within_reach_of_the_start_pose():
     drawn = draw()
     own = np.asarray(LIBRARY.points)[np.arange(B) % 5]
     gap = np.abs(drawn.points[:, 0, 1:] - own[:, 0, 1:]).max()
-    assert gap <= 0.5 * ALL.curve_match_rad
+    assert gap <= 0.5 * MATCH_RAD
 
 
 # The duration.
@@ -195,7 +197,7 @@ def test_no_curve_rises_faster_than_its_bound():
 
 
 def test_the_share_of_drawn_curves_is_that_of_the_setting():
-    drawn = draw(dataclasses.replace(ALL, drawn_share=0.3))
+    drawn = draw(dataclasses.replace(ALL, drawn_curves=0.3))
     own = style_curve(LIBRARY, jnp.arange(B) % 5)
     same = (np.asarray(drawn.points) == np.asarray(own.points)).all(axis=(1, 2))
     assert abs(same.mean() - 0.7) < 0.02
@@ -203,30 +205,26 @@ def test_the_share_of_drawn_curves_is_that_of_the_setting():
 
 
 def test_without_drawn_curves_starts_are_what_they_were(built):
-    world, config = built.world, CONFIG.task
-    starts = draw_starts(config, world, KEY, 64, None, None)
-    assert with_curves(config, world, KEY, starts) is starts
-    some = dataclasses.replace(config, drawn_share=0.5)
-    drawn = with_curves(some, world, KEY, draw_starts(some, world, KEY, 64, None, None))
+    world, config, none = built.world, CONFIG.training_aids, CurriculumState()
+    starts = draw_starts(config, 0.3, world, KEY, 64, none)
+    assert with_curves(config, MATCH_RAD, world, KEY, starts) is starts
+    some = dataclasses.replace(config, drawn_curves=0.5)
+    others = draw_starts(some, 0.3, world, KEY, 64, none)
+    drawn = with_curves(some, MATCH_RAD, world, KEY, others)
     for name in ("getup", "kind", "row"):
         np.testing.assert_array_equal(getattr(drawn, name), getattr(starts, name))
-    again = with_curves(some, world, KEY, starts)
+    again = with_curves(some, MATCH_RAD, world, KEY, starts)
     jax.tree.map(np.testing.assert_array_equal, again.curve, drawn.curve)
-    elsewhere = with_curves(some, world, KEY, starts, 32)
+    elsewhere = with_curves(some, MATCH_RAD, world, KEY, starts, 32)
     assert (np.asarray(elsewhere.curve.points) != np.asarray(drawn.curve.points)).any()
-
-
-def test_evaluation_follows_the_styles_themselves():
-    helped = dataclasses.replace(ALL, curve_noise=2.0)
-    assert whole_episodes(helped).drawn_share == 0.0
 
 
 # In the task.
 
 
 def test_episodes_carry_their_curves(character):
-    task = dataclasses.replace(CONFIG.task, drawn_share=0.5, stand_start=0.2, clip_start=0.4)
-    built = tiny_task(character, dataclasses.replace(CONFIG, task=task))
+    config = changed(drawn_curves=0.5, stand_start=0.2, reference_start=0.4)
+    built = tiny_task(character, config)
     env, world = built.environment, built.world
     state = jax.jit(env.init, static_argnums=2)(world, KEY, 64)
     own = style_curve(world, state.getup)
@@ -259,29 +257,28 @@ def test_starts_along_the_clip_keep_their_phase(built):
 
 
 def test_an_episode_that_starts_anew_gets_a_curve_of_its_own(character):
-    task = dataclasses.replace(CONFIG.task, drawn_share=1.0)
-    built = tiny_task(character, dataclasses.replace(CONFIG, task=task))
+    built = tiny_task(character, changed(drawn_curves=1.0))
     env, world = built.environment, built.world
     state = jax.jit(env.init, static_argnums=2)(world, KEY, 8)
     ending = state.replace(time=state.time.at[:4].set(99.0))
     after, output = jax.jit(env.step)(world, ending, state.action)
     np.testing.assert_array_equal(output.truncated[:4], True)
-    changed = (np.asarray(after.points) != np.asarray(state.points)).any(axis=(1, 2))
-    np.testing.assert_array_equal(changed, np.asarray(output.truncated | output.terminated))
+    new = (np.asarray(after.points) != np.asarray(state.points)).any(axis=(1, 2))
+    np.testing.assert_array_equal(new, np.asarray(output.truncated | output.terminated))
 
 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"drawn_share": 1.5}, r"task\.drawn_share: expected a number from 0 to 1, got 1\.5"),
-        ({"curve_noise": -1.0}, r"task\.curve_noise: expected a number from 0 to 10, got -1\.0"),
-        ({"duration_range": (1.3, 0.7)}, r"task\.duration_range: .* the smaller one first"),
+        ({"drawn_curves": 1.5}, r"curriculum\.drawn_curves: expected .* from 0 to 1, got 1\.5"),
+        ({"curve_noise": -1.0}, r"curriculum\.curve_noise: expected .* from 0 to 10, got -1\.0"),
+        ({"duration_range": (1.3, 0.7)}, r"curriculum\.duration_range: .* the smaller one first"),
         (
             {"duration_range": (0.0, 1.0)},
-            r"task\.duration_range\[0\]: expected a number more than 0",
+            r"curriculum\.duration_range\[0\]: expected a number more than 0",
         ),
     ],
 )
 def test_mistakes_of_the_settings(settings, message):
     with pytest.raises(ConfigError, match=message):
-        TaskConfig(**settings)
+        CurriculumConfig(**settings)

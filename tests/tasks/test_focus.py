@@ -1,12 +1,10 @@
 from __future__ import annotations
 
-import dataclasses
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from tiny_task import CONFIG, tiny_task
+from tiny_task import changed, tiny_task
 
 from getup_jax.envs.getup.curriculum import start_prioritisation, success_rate
 from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
@@ -101,18 +99,19 @@ def test_a_cell_moves_to_its_episodes_results_and_the_others_stay():
 
 
 def test_the_task_follows_the_success_of_its_starts(character):
-    config = dataclasses.replace(CONFIG, task=dataclasses.replace(CONFIG.task, focus=0.9))
+    config = changed(prioritisation=0.9)
     built = tiny_task(character, config)
     env, world = built.environment, built.world
     state = env.init(world, jax.random.PRNGKey(0), 8)
-    assert state.focus.shape == (3, 2, start_prioritisation.BINS)
+    assert state.curriculum.success.shape == (3, 2, start_prioritisation.BINS)
     ends = state.duration + config.task.stand_time_s
-    state = state.replace(time=ends, focus=state.focus + 0.5)
+    learned = state.curriculum.replace(success=state.curriculum.success + 0.5)
+    state = state.replace(time=ends, curriculum=learned)
     after, output = jax.jit(env.step)(world, state, jnp.zeros((8, env.action_size)))
     assert bool(output.truncated.all())
     # who started standing stands in this one step, and nobody else does
-    moved = np.argwhere(np.asarray(after.focus) != 0.5)
-    value = np.asarray(after.focus)[tuple(moved.T)]
+    moved = np.argwhere(np.asarray(after.curriculum.success) != 0.5)
+    value = np.asarray(after.curriculum.success)[tuple(moved.T)]
     np.testing.assert_array_equal(value > 0.5, moved[:, 0] == STANDING)
     assert set(moved[:, 0]) == set(np.asarray(state.kind).tolist())
     assert len(set(moved[:, 0])) > 1
@@ -137,15 +136,17 @@ def test_styles_that_cannot_start_in_a_region_have_no_weight(built):
 
 
 def test_short_episodes_end_early_and_say_nothing_about_success(character):
-    task = dataclasses.replace(CONFIG.task, focus=0.9, short_share=0.999, short_s=0.3)
-    built = tiny_task(character, dataclasses.replace(CONFIG, task=task))
+    config = changed(prioritisation=0.9, short_share=0.999, short_s=0.3)
+    built = tiny_task(character, config)
     env, world = built.environment, built.world
     state = env.init(world, jax.random.PRNGKey(0), 8)
     short = np.asarray(jnp.isfinite(state.until))
     np.testing.assert_array_equal(short, np.asarray(state.kind) != STANDING)
     assert short.any()
-    state = state.replace(time=jnp.where(short, state.until, state.time), focus=state.focus + 0.5)
+    learned = state.curriculum.replace(success=state.curriculum.success + 0.5)
+    time = jnp.where(short, state.until, state.time)
+    state = state.replace(time=time, curriculum=learned)
     after, output = jax.jit(env.step)(world, state, jnp.zeros((8, env.action_size)))
     np.testing.assert_array_equal(output.truncated, short)
     assert np.isnan(np.asarray(output.episode["return_rate"])[short]).all()
-    np.testing.assert_array_equal(after.focus, 0.5)
+    np.testing.assert_array_equal(after.curriculum.success, 0.5)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tiny_task import LATENT, untrained_prior
 
+from getup_jax.config import CurriculumConfig
 from getup_jax.envs.getup.drawn_curves import style_curve
 from getup_jax.envs.getup.episode import CLIP, LYING, STANDING, EpisodeState
 from getup_jax.motion.getup import curves
@@ -196,9 +197,12 @@ def test_the_head_on_the_floor_for_ten_steps_ends_an_episode(jitted, character):
 
 
 def test_within_its_grace_a_head_on_the_floor_costs_the_reward_alone(jitted, character):
-    config = dataclasses.replace(jitted.task.config, head_grace_s=0.1)  # three steps
+    aids = jitted.task.curriculum
+    config = dataclasses.replace(aids.config, head_grace_s=0.1)  # three steps
     lenient = Jitted.__new__(Jitted)
-    lenient.task = dataclasses.replace(jitted.task, config=config)
+    lenient.task = dataclasses.replace(
+        jitted.task, curriculum=dataclasses.replace(aids, config=config)
+    )
     _, (_, outputs) = jax.jit(lenient._play, static_argnums=2)(
         jitted.world, head_down(jitted, character), 14
     )
@@ -365,7 +369,7 @@ def test_resets_draw_the_kinds_in_their_shares_and_all_styles(jitted):
 
 
 def test_a_share_of_zero_draws_nothing(jitted):
-    config = dataclasses.replace(jitted.task.config, stand_start=0.0, clip_start=0.0)
-    task = dataclasses.replace(jitted.task, config=config)
+    aids = dataclasses.replace(jitted.task.curriculum, config=CurriculumConfig(), stand_start=0.0)
+    task = dataclasses.replace(jitted.task, curriculum=aids)
     state = jax.jit(task.init, static_argnums=2)(jitted.world, jax.random.PRNGKey(0), 500)
     np.testing.assert_array_equal(state.kind, LYING)

@@ -8,21 +8,22 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from ground_samples import TERRAIN, deepest_contact
-from tiny_task import CONFIG, getups, neutral_prior
+from tiny_task import CONFIG, changed, getups, neutral_prior
 
 from getup_jax.config import ConfigError
 from getup_jax.envs.getup import terminations
 from getup_jax.envs.getup.build import assemble
-from getup_jax.envs.getup.curriculum import sampler_update, start_prioritisation, start_sampler
+from getup_jax.envs.getup.curriculum import start_sampler
 from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
 from getup_jax.envs.getup.resets import lying_bodies as limp
-from getup_jax.envs.getup.resets import misfit, region_pool
+from getup_jax.envs.getup.resets import region_pool
 from getup_jax.physics.character import load_character
 from getup_jax.physics.native import NativeEngine
 from getup_jax.physics.surface import link_gaps
 from getup_jax.pose_prior.data import pose_conditions
 
-TASK = dataclasses.replace(CONFIG.task, stand_start=0.3, clip_start=0.2, pool_size=120)
+SETTINGS = changed(stand_start=0.3, reference_start=0.2, pool_size=120)
+TASK = SETTINGS.task
 ROWS = 5  # 120 over three kinds, four regions and two styles
 
 
@@ -31,9 +32,9 @@ def cache(tmp_path_factory):
     return tmp_path_factory.mktemp("starts")
 
 
-def uneven_task(character, cache, task=TASK):
+def uneven_task(character, cache, config=SETTINGS):
     """A get-up task on the small irregular ground."""
-    config = dataclasses.replace(CONFIG, task=task, terrain=TERRAIN)
+    config = dataclasses.replace(config, terrain=TERRAIN)
     with pytest.MonkeyPatch.context() as patch:
         for module in (region_pool, limp):
             patch.setattr(module, "cache_dir", lambda: cache)
@@ -77,8 +78,7 @@ def test_lying_starts_fit_their_curve(uneven, site):
 def test_the_flat_region_has_limp_bodies_only_if_asked(uneven, site, character, cache):
     own = np.abs(rows(uneven, LYING, 0, 0)[:, 7:] - site.character.neutral_qpos[7:])
     assert own.sum(axis=1).max() < 3.0
-    task = dataclasses.replace(TASK, limp_share=0.6, limp_drops=30)
-    built = uneven_task(character, cache, task)
+    built = uneven_task(character, cache, changed(SETTINGS, limp_share=0.6, limp_drops=30))
     for style, getup in enumerate(built.getups):
         qpos = rows(built, LYING, 0, style)
         limp = np.abs(qpos[:, 7:] - site.character.neutral_qpos[7:]).sum(axis=1) > 3.0
@@ -100,8 +100,8 @@ def test_times_are_those_of_the_kind(uneven):
 
 
 def test_every_region_has_starts_along_the_clip_if_asked(character, site, cache):
-    task = dataclasses.replace(TASK, clip_everywhere=True)
-    built = uneven_task(character, cache, task)
+    config = changed(SETTINGS, reference_everywhere=True)
+    built = uneven_task(character, cache, config)
     pool = built.world.pool
     time = np.asarray(pool.time)[np.asarray(pool.table)]
     np.testing.assert_array_equal(time[CLIP, 1:], np.repeat(time[CLIP, :1], 3, axis=0))
@@ -112,10 +112,11 @@ def test_every_region_has_starts_along_the_clip_if_asked(character, site, cache)
         flat = np.concatenate([rows(built, CLIP, 0, style) for style in range(2)])
         np.testing.assert_allclose(qpos[:, 7:], flat[:, 7:], atol=1e-6)
     state = built.environment.init(built.world, jax.random.PRNGKey(0), 512)
-    state = state.curriculum.replace(opened=jnp.asarray(4, jnp.int32))
-    kind, region = start_sampler._places(task, jax.random.PRNGKey(0), 2000, state)
+    state = state.curriculum.regions.replace(opened=jnp.asarray(4, jnp.int32))
+    aids, stand = config.training_aids, config.task.stand_start
+    kind, region = start_sampler._places(aids, stand, jax.random.PRNGKey(0), 2000, state)
     share = np.asarray(kind == CLIP)[np.asarray(region) > 0].mean()
-    assert share == pytest.approx(task.clip_start, abs=0.04)
+    assert share == pytest.approx(aids.reference_start, abs=0.04)
 
 
 def test_a_style_that_nothing_fits_is_left_out_of_the_region(uneven, site, cache, monkeypatch):
@@ -126,7 +127,9 @@ def test_a_style_that_nothing_fits_is_left_out_of_the_region(uneven, site, cache
     odd[0, 1:] = np.pi / 2, np.pi / 2  # no rag-doll lies upright
     styles, log = [clip, dataclasses.replace(curve, points=odd, clip=clip.clip)], []
     engine = NativeEngine(site.character, CONFIG.physics)
-    flat = region_pool.FlatStarts([clip, clip], load_character(CONFIG.physics), TASK, 0, 65)
+    flat = region_pool.FlatStarts(
+        [clip, clip], load_character(CONFIG.physics), TASK, SETTINGS.training_aids, 0, 65
+    )
     pool = region_pool.build_region_pool(styles, flat, site, engine, TASK, log.append)
     np.testing.assert_array_equal(pool.startable.count, [2, 1, 1, 1])
     np.testing.assert_array_equal(pool.startable.styles[1:, 0], 0)
@@ -162,43 +165,6 @@ def test_states_made_in_chunks_are_the_same(engine, character, monkeypatch):
     monkeypatch.setattr(region_pool, "_PLACE_CHUNK", 2)
     parts = region_pool.place_in_chunks(engine, qpos, qvel)
     jax.tree.map(np.testing.assert_array_equal, whole, parts)
-
-
-def test_misfits_are_classes_of_how_far_the_neck_is_below_the_curve(uneven):
-    """In steps of 6 cm; the task above has no focus and needs none."""
-    env, world = uneven.environment, uneven.world
-    assert world.pool.misfit is None
-    found = np.asarray(misfit.classes(world.pool, env.observer, world.terrain, world.points))
-    table = np.asarray(world.pool.table)
-    np.testing.assert_array_equal(found[table[LYING, 0]], 0)
-    np.testing.assert_array_equal(found[table[STANDING]], 0)
-    np.testing.assert_array_equal(found[table[CLIP, 0]], 0)
-    kinematics = world.pool.physics.kinematics
-    height = np.asarray(env.observer.posture(kinematics, world.terrain).features[:, 0])
-    for style in range(2):
-        row = table[LYING, 1:, style]
-        below = np.asarray(world.points)[style, 0, 0] - height[row]
-        steps = np.select([below < 0.06, below < 0.12, below < 0.18], [0, 1, 2], 3)
-        np.testing.assert_array_equal(found[row], steps)
-    assert len(np.unique(found)) > 1
-
-
-def test_lying_starts_of_another_misfit_are_of_another_cell(character, cache):
-    built = uneven_task(character, cache, dataclasses.replace(TASK, focus=0.5))
-    pool = built.world.pool
-    regions, count = pool.table.shape[1], pool.table.shape[-1]
-    cells = np.asarray(pool.misfit)[np.asarray(pool.table[LYING, 3, 0])]
-    state = at(built, LYING, 3, count)
-    place, _, part = sampler_update.first_cell(pool, state, built.environment.engine.control_dt)
-    np.testing.assert_array_equal(part, cells)
-    np.testing.assert_array_equal(place, LYING * regions + 3)
-    # the class of the first row is solved, the others are not: they are drawn instead
-    learned = start_prioritisation.first(pool).at[LYING * regions + 3, 0, cells[0]].set(1.0)
-    learned = learned.at[CLIP * regions].set(1.0)
-    weight = np.asarray(start_prioritisation.weights(learned, pool, built.world.duration, 0.5))
-    expected = np.where(cells == cells[0], 0.5, 1.0)
-    np.testing.assert_allclose(weight[LYING * regions + 3, 0], expected, atol=1e-6)
-    assert len(np.unique(cells)) > 1
 
 
 # The task on irregular ground.

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tiny_task import CONFIG, LATENT, getups, supine
+from tiny_task import LATENT, changed, getups, supine
 
 from getup_jax.config import ConfigError
 from getup_jax.core.resources import asset_path
@@ -27,17 +27,18 @@ from getup_jax.motion.getup.curve_alignment import FEATURE_SCALE
 from getup_jax.pose_prior.data import pose_conditions
 
 ACTION = LATENT + 49
-TASK = dataclasses.replace(CONFIG.task, stand_start=0.2, clip_start=0.3, pool_size=60)
+SETTINGS = changed(stand_start=0.2, reference_start=0.3, pool_size=60)
 
 
-def make_pool(styles, character, engine, config=TASK, **flat):
+def make_pool(styles, character, engine, config=SETTINGS, **flat):
     """The pool of the styles on the flat plane; flat: other arguments of `FlatStarts`."""
     flat = {"seed": 0, "action_size": ACTION, **flat}
-    return build_pool(FlatStarts(styles, character, config, **flat), engine, print)
+    starts = FlatStarts(styles, character, config.task, config.curriculum, **flat)
+    return build_pool(starts, engine, print)
 
 
 def pool_of(character, engine, **changes):
-    return make_pool(getups(character), character, engine, dataclasses.replace(TASK, **changes))
+    return make_pool(getups(character), character, engine, changed(SETTINGS, **changes))
 
 
 def rows(pool, kind: int, style: int) -> dict[str, np.ndarray]:
@@ -64,7 +65,7 @@ def test_every_kind_and_style_has_its_share_of_the_pool(pool):
 
 
 def test_a_kind_without_a_share_has_one_row_a_style(character, engine):
-    pool = pool_of(character, engine, stand_start=0.0, clip_start=0.0)
+    pool = pool_of(character, engine, stand_start=0.0, reference_start=0.0)
     assert pool.table.shape == (3, 1, 2, 30)
     assert len(np.unique(pool.table[LYING])) == 60
     assert len(np.unique(pool.table[STANDING])) == 2
@@ -72,7 +73,7 @@ def test_a_kind_without_a_share_has_one_row_a_style(character, engine):
 
 
 def test_the_shares_of_the_kinds_are_in_their_order():
-    shares = kind_shares(TASK)
+    shares = kind_shares(SETTINGS.task, SETTINGS.training_aids)
     assert shares[LYING] == pytest.approx(0.5)
     assert (shares[STANDING], shares[CLIP]) == (0.2, 0.3)
 
@@ -138,7 +139,7 @@ def limp_bodies(character) -> Starts:
 
 def test_a_share_of_the_lying_starts_are_limp_bodies_that_fit(pool, character, engine):
     limp = limp_bodies(character)
-    config = dataclasses.replace(TASK, limp_share=0.4)
+    config = changed(SETTINGS, limp_share=0.4)
     mixed = make_pool(getups(character), character, engine, config, limp=limp)
     for style in range(2):
         start, own = rows(mixed, LYING, style), rows(pool, LYING, style)
@@ -154,7 +155,7 @@ def test_a_share_of_the_lying_starts_are_limp_bodies_that_fit(pool, character, e
 
 def test_a_style_that_no_limp_body_fits_keeps_its_own_poses(pool, character, engine, capsys):
     limp = limp_bodies(character).take(np.array([4]))
-    config = dataclasses.replace(TASK, limp_share=1.0)
+    config = changed(SETTINGS, limp_share=1.0)
     mixed = make_pool(getups(character), character, engine, config, limp=limp)
     np.testing.assert_array_equal(rows(mixed, LYING, 0)["qpos"], rows(pool, LYING, 0)["qpos"])
     assert capsys.readouterr().out.strip() == (
@@ -178,7 +179,7 @@ def found_path(character, time: np.ndarray) -> FoundPath:
 def test_starts_along_the_way_are_found_states_where_there_are_any(character, engine, tmp_path):
     style = getups(character)[1]
     save_path(tmp_path, style, found_path(character, np.array([0.0, 0.2, 0.4, 0.6, 0.8])))
-    pool = pool_of(character, engine, paths=str(tmp_path), path_share=1.0)
+    pool = pool_of(character, engine, archive=str(tmp_path), archive_share=1.0)
     start = rows(pool, CLIP, 1)
     action = np.asarray(pool.action)[np.asarray(pool.table[CLIP, 0, 1])]
     found = start["time"] < 0.9
@@ -227,16 +228,16 @@ def test_without_a_pose_prior_a_found_state_has_no_action(character, tmp_path):
 
 
 def test_paths_that_cannot_be_used_say_why(character, engine, tmp_path):
-    with pytest.raises(ConfigError, match=r"task\.paths: no folder .*getup-search"):
-        pool_of(character, engine, paths=str(tmp_path / "none"))
+    with pytest.raises(ConfigError, match=r"curriculum\.archive: no folder .*getup-search"):
+        pool_of(character, engine, archive=str(tmp_path / "none"))
     style = getups(character)[0]
     file = save_path(tmp_path, style, found_path(character, np.zeros(2)))
-    config = dataclasses.replace(TASK, paths=str(tmp_path))
+    config = changed(SETTINGS, archive=str(tmp_path))
     with pytest.raises(ConfigError, match="expected 56 positions and 70 actions, got 56 and 65"):
         make_pool(getups(character), character, engine, config, action_size=70)
     file.write_bytes(file.read_bytes()[:100])
     with pytest.raises(ConfigError, match=r"clip\.3\.npz: not a path that getup-search wrote"):
-        pool_of(character, engine, paths=str(tmp_path))
+        pool_of(character, engine, archive=str(tmp_path))
 
 
 def test_a_curve_unlike_every_frame_starts_lying_instead(character, engine):
@@ -279,7 +280,7 @@ def test_a_wider_match_accepts_it(character, engine):
     points = curve.points.copy()
     points[0, 2] = 1.0
     curve = dataclasses.replace(curve, points=points)
-    config = dataclasses.replace(TASK, curve_match_rad=1.2)
+    config = changed(SETTINGS, curve_match_rad=1.2)
     pool = make_pool([clip, curve], character, engine, config)
     assert pool.table.shape == (3, 1, 2, 10)
 
@@ -287,6 +288,6 @@ def test_a_wider_match_accepts_it(character, engine):
 def test_curves_that_lie_for_long_are_named():
     points = np.tile([0.1, 1.57, 0.0], (curves.NUM_POINTS, 1))
     said: list[str] = []
-    say_which_lie([GetUp("waits", 2.0, points), GetUp("rises", 0.9, points)], TASK, said.append)
+    say_which_lie([GetUp("waits", 2.0, points), GetUp("rises", 0.9, points)], SETTINGS, said.append)
     (line,) = said
     assert line.endswith("more than 0.3 s ends the episode; begin them later: waits (2.0 s)")

@@ -6,7 +6,7 @@ from ground_samples import deepest_contact, make_site
 from scipy.spatial.transform import Rotation
 from tiny_task import CONFIG
 
-from getup_jax.envs.getup.resets.terrain_projection import set_down, to_normal
+from getup_jax.envs.getup.resets.terrain_projection import project_to_ground, to_normal
 
 UP = np.array([[0.0, 0.0, 1.0]])
 
@@ -25,7 +25,9 @@ def placed(site, height: float, count: int = 20):
     qvel[:, 0] = 1.0
     xy = site.ground.draw_spawn(3, count, rng)
     field, yaw = site.ground.field(), rng.uniform(-np.pi, np.pi, count)
-    return (xy, yaw, field.normal(xy)), set_down(site.character, field, qpos, qvel, xy, yaw)
+    return (xy, yaw, field.normal(xy)), project_to_ground(
+        site.character, field, qpos, qvel, xy, yaw
+    )
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tiny_task import CONFIG, LATENT, getups, untrained_prior
 
-from getup_jax.config import CompositeConfig, GroupConfig, NetworkConfig, PhysicsConfig
+from getup_jax.config import NetworkConfig, PhysicsConfig
 from getup_jax.core import mirror
 from getup_jax.core.mirror import AXIAL, POLAR, Symmetry, concatenated, signed
 from getup_jax.envs.getup.build import BuiltTask, assemble
@@ -144,7 +144,7 @@ def test_servo_targets_of_images_are_images(task):
     rng = np.random.default_rng(2)
     action = jnp.asarray(rng.normal(size=(5, 65)), jnp.float32)
     condition = jnp.asarray(rng.uniform(0.2, 2.0, (5, 3)), jnp.float32)
-    units = env.units(task.world)
+    units = env.decoder(task.world)
     target = units.target(action, condition)
     image = units.target(found.action(action), mirror.CURVE(condition))
     np.testing.assert_allclose(image, joint_mirror(env.character)(target), atol=1e-5)
@@ -230,19 +230,15 @@ def test_a_learner_is_equivariant_and_stays_so_while_it_trains(task, learner, tr
 def test_what_has_no_mirror_image(character, task):
     observer = task.environment.observer
     plain, mirrored = (untrained_prior(character, mirrored=m) for m in (False, True))
-    assert find_symmetry(CONFIG, character, observer, mirrored) is not None
-    assert find_symmetry(CONFIG, character, observer, plain) is None
-    group = GroupConfig(links=("full",), clips=())
-    composite = CompositeConfig(task="getup", groups={"all": group})
-    styled = dataclasses.replace(CONFIG, composite=composite)
-    assert find_symmetry(styled, character, observer, mirrored) is None
+    assert find_symmetry(character, observer, mirrored) is not None
+    assert find_symmetry(character, observer, plain) is None
     lame = dataclasses.replace(character, torque_limit=np.arange(49.0))
-    assert find_symmetry(CONFIG, lame, observer, mirrored) is None
+    assert find_symmetry(lame, observer, mirrored) is None
 
 
 def test_without_a_prior_the_action_is_offsets_alone(character):
     observer = Observer.of(character, 4, 49)
-    found = find_symmetry(CONFIG, character, observer, None)
+    found = find_symmetry(character, observer, None)
     assert found is not None
     assert (found.action.size, found.observation.size) == (49, 352 - 16)
 
@@ -261,7 +257,7 @@ def test_a_mirrored_run_is_restored_and_goes_on_bit_for_bit(task, learner, train
     assert loaded.config.network.mirror
     prior = from_dict(loaded.prior)
     env = task.environment
-    found = find_symmetry(loaded.config, env.character, env.observer, prior)
+    found = find_symmetry(env.character, env.observer, prior)
     assert found is not None
     np.testing.assert_array_equal(found.observation.index, symmetry_of(task).observation.index)
     policy = from_nested(template.learner.policy, loaded.policy, "here")

@@ -8,26 +8,23 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from tiny_task import CONFIG, tiny_task
+from tiny_task import changed, tiny_task
 
-from getup_jax.config import CompositeConfig, Config, ConfigError, NetworkConfig, PPOConfig
+from getup_jax.config import Config, ConfigError, CurriculumConfig, NetworkConfig, PPOConfig
 from getup_jax.envs.getup.build import BuiltTask
-from getup_jax.envs.getup.curriculum.start_sampler import whole_episodes
 from getup_jax.envs.getup.episode import LYING
 from getup_jax.training import run
 
 PPO = PPOConfig(num_envs=8, num_steps=3, epochs=1, minibatch_size=24, popart=True)
-SHARP = dataclasses.replace(CONFIG.task, sharpness=1.5, track_weight=0.5, track_sharpness=3.0)
-
-
-def with_task(task) -> Config:
-    network = NetworkConfig(hidden_sizes=(8,))
-    return dataclasses.replace(CONFIG, task=task, ppo=PPO, network=network)
+NETWORK = NetworkConfig(hidden_sizes=(8,))
+SHARP: Config = dataclasses.replace(
+    changed(reward_sharpness=1.5, track_weight=0.5, track_sharpness=3.0), ppo=PPO, network=NETWORK
+)
 
 
 @pytest.fixture(scope="module")
 def sharp(character) -> BuiltTask:
-    return tiny_task(character, with_task(SHARP))
+    return tiny_task(character, SHARP)
 
 
 def one_step(built: BuiltTask):
@@ -57,8 +54,7 @@ def test_what_is_paid_is_sharper_and_what_is_reported_is_the_papers(built, sharp
 
 def test_a_grace_time_pays_no_objective(character):
     # the head counts as on the floor wherever it is
-    task = dataclasses.replace(SHARP, head_grace_s=9.0, head_clearance_m=9.0)
-    lenient = tiny_task(character, with_task(task))
+    lenient = tiny_task(character, changed(SHARP, head_grace_s=9.0, head_clearance_m=9.0))
     env, rows = lenient.environment, jnp.arange(4)
     state = env.start(lenient.world, rows % 2, jnp.full(4, LYING), rows)
     held = state.replace(head_steps=jnp.array([0, 0, 20, 20]))
@@ -70,7 +66,7 @@ def test_a_grace_time_pays_no_objective(character):
 
 def test_the_learner_has_a_critic_each_with_the_weights_that_are_set(sharp, monkeypatch):
     monkeypatch.setattr(run, "build_task", lambda config, log: sharp)
-    job = run.build_job(with_task(SHARP), lambda text: None)
+    job = run.build_job(SHARP, lambda text: None)
     np.testing.assert_allclose(job.learner.weights, (2 / 3, 1 / 3))
     state = job.learner.init(job.world, jax.random.PRNGKey(0))
     value = job.learner.value(state.learner, state.environment.observation)
@@ -79,30 +75,36 @@ def test_the_learner_has_a_critic_each_with_the_weights_that_are_set(sharp, monk
     assert 0.0 < float(metrics["rollout/reward_track"]) < 1.0
 
 
-def test_evaluation_has_the_papers_reward_alone():
-    task = whole_episodes(SHARP)
-    assert (task.sharpness, task.track_weight) == (1.0, 0.0)
+def test_each_term_can_be_an_objective_with_a_critic_of_its_own(character, built):
+    config = changed(SHARP, objectives="terms", track_weight=0.0)
+    env = tiny_task(character, config).environment
+    terms = ("height", "orientation", "velocity", "posture", "natural")
+    assert env.objective_weights == dict.fromkeys(terms, 1.0)
+    _, output = one_step(dataclasses.replace(built, environment=env))
+    for index, name in enumerate(terms):
+        np.testing.assert_array_equal(output.reward[:, index], output.metrics[f"reward_{name}"])
+    assert output.reward.shape == (4, env.num_objectives)
+
+
+def test_without_a_pose_prior_no_term_is_natural(built):
+    aids = built.environment.curriculum
+    aids = dataclasses.replace(aids, config=CurriculumConfig(objectives="terms"))
+    env = dataclasses.replace(built.environment, latent_size=0, curriculum=aids)
+    assert "natural" not in env.objective_weights
 
 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"sharpness": 0.0}, r"task\.sharpness: expected a number more than 0"),
-        ({"track_sharpness": -1.0}, r"task\.track_sharpness: expected a number more than 0"),
+        ({"reward_sharpness": 0.0}, r"curriculum\.reward_sharpness: expected a number more than 0"),
+        ({"track_sharpness": -1.0}, r"curriculum\.track_sharpness: expected a number more than 0"),
+        ({"objectives": "all"}, r"curriculum\.objectives: expected one of .*'terms'.*, got 'all'"),
         (
             {"track_weight": -0.1},
-            r"task\.track_weight: expected a number from 0 to 1000, got -0\.1",
+            r"curriculum\.track_weight: expected a number from 0 to 1000, got -0\.1",
         ),
     ],
 )
 def test_mistakes_of_the_settings(settings, message):
     with pytest.raises(ConfigError, match=message):
-        dataclasses.replace(CONFIG.task, **settings)
-
-
-@pytest.mark.parametrize("name", ["sharpness", "track_weight"])
-def test_a_composite_says_itself_what_is_rewarded(name):
-    task = dataclasses.replace(CONFIG.task, **{name: 2.0})
-    composite = CompositeConfig(task="getup", terms=("total",))
-    with pytest.raises(ConfigError, match=rf"task\.{name}: expected . where `composite`"):
-        dataclasses.replace(CONFIG, task=task, composite=composite)
+        CurriculumConfig(**settings)

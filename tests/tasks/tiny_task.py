@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from getup_jax.config import Config, PhysicsConfig, TaskConfig
+from getup_jax.config import Config, CurriculumConfig, PhysicsConfig, TaskConfig
 from getup_jax.envs.getup.build import BuiltTask, assemble
 from getup_jax.motion.clips import Clip, GetUp
 from getup_jax.motion.getup.curves import NUM_POINTS
@@ -22,8 +25,20 @@ LATENT = 16
 CLIP_SECONDS = 1.0
 CONFIG = Config(
     physics=PhysicsConfig(engine="native"),
-    task=TaskConfig(stand_start=0.3, clip_start=0.2, pool_size=24, settle_s=0.2),
+    task=TaskConfig(stand_start=0.3, pool_size=24, settle_s=0.2),
+    curriculum=CurriculumConfig(reference_start=0.2),
 )
+
+
+def changed(config: Config = CONFIG, **settings: Any) -> Config:
+    """The config with other settings of its task and its curriculum, by their names alone."""
+    task = {name: value for name, value in settings.items() if hasattr(TaskConfig, name)}
+    aids = {name: value for name, value in settings.items() if name not in task}
+    return dataclasses.replace(
+        config,
+        task=dataclasses.replace(config.task, **task),
+        curriculum=dataclasses.replace(config.training_aids, **aids),
+    )
 
 
 def supine(character: CharacterSpec) -> np.ndarray:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from getup_jax.config import Config, ConfigError
 from getup_jax.config.load import load_config
+from getup_jax.config.task import OWN_POSES
 from getup_jax.envs.getup.build import build_task
-from getup_jax.envs.getup.curriculum.start_sampler import whole_episodes
 from getup_jax.envs.getup.resets.archived_states import load_path, path_file, save_path
 from getup_jax.runtime.console import Display
 from getup_jax.trajectory_search.finder import POPULATION, ROUNDS, Finder
@@ -22,7 +22,7 @@ _EXAMPLES = """\
 examples:
   getup-search flat --out runs/paths                   all styles of configs/flat.yaml
   getup-search flat --out runs/paths --only supine     those whose names start with `supine`
-  getup-train flat task.paths=runs/paths               train with starts at the states found
+  getup-train flat curriculum.archive=runs/paths               train with starts at the states found
 
 A style is searched with other settings until a search ends standing. What an earlier command found
 is not searched again.
@@ -77,9 +77,9 @@ def search_config(config: Config, seed: int) -> Config:
     if config.terrain is not None:
         raise ConfigError("terrain: expected null; ways up are searched on flat ground")
     task = dataclasses.replace(
-        whole_episodes(config.task), stand_start=0.0, start_noise_rad=START_NOISE_RAD
+        config.task, stand_start=0.0, start_noise_rad=START_NOISE_RAD, **OWN_POSES
     )
-    return dataclasses.replace(config, task=task, seed=seed)
+    return dataclasses.replace(config, task=task, curriculum=None, seed=seed)
 
 
 def _searches(finder: Finder, wanted: Sequence[int], args: argparse.Namespace) -> Iterator[str]:

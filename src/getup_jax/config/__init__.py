@@ -13,6 +13,7 @@ from dataclasses import field
 
 from getup_jax.config.check import ConfigError, require
 from getup_jax.config.composite import CompositeConfig, DiscriminatorConfig, GroupConfig
+from getup_jax.config.curriculum import CurriculumConfig
 from getup_jax.config.learning import NetworkConfig, PPOConfig, TrainConfig
 from getup_jax.config.ranges import LAST_SEED, check_numbers, number
 from getup_jax.config.simulation import MotionConfig, PhysicsConfig, PriorConfig, TerrainConfig
@@ -22,6 +23,7 @@ __all__ = [
     "CompositeConfig",
     "Config",
     "ConfigError",
+    "CurriculumConfig",
     "DiscriminatorConfig",
     "GroupConfig",
     "MotionConfig",
@@ -45,6 +47,7 @@ class Config:
     # None: no pose prior, the action is the servo target and no offset is unnatural
     prior: PriorConfig | None = field(default_factory=PriorConfig)
     task: TaskConfig = field(default_factory=TaskConfig)
+    curriculum: CurriculumConfig | None = None  # None: nothing helps to train
     terrain: TerrainConfig | None = None  # None: a flat plane
     composite: CompositeConfig | None = None  # None: the get-up task
     network: NetworkConfig = field(default_factory=NetworkConfig)
@@ -54,7 +57,12 @@ class Config:
     @property
     def composite_motion(self) -> bool:
         """Whether the task is composite motion; False: getting up."""
-        return self.composite is not None and self.composite.task == "composite"
+        return self.composite is not None
+
+    @property
+    def training_aids(self) -> CurriculumConfig:
+        """The curriculum; one that does nothing where there is none."""
+        return self.curriculum or CurriculumConfig()
 
     def __post_init__(self) -> None:
         check_numbers(self, "")
@@ -65,16 +73,15 @@ class Config:
         unlike = self.network.mirror and self.prior is not None and not self.prior.mirror
         expected = "false where prior.mirror is false, as its latents have no mirror images"
         require(self.composite_motion or not unlike, "network.mirror", expected, True)
-        for name, off in (("track_weight", 0.0), ("sharpness", 1.0)):
-            value = getattr(self.task, name)
-            ok = self.composite is None or value == off
-            expected = f"{off:g} where `composite` says what is rewarded"
-            require(ok, f"task.{name}", expected, value)
-        if self.composite is None or not self.composite.groups:
+        share = self.task.stand_start + self.training_aids.reference_start
+        expected = "at most 1"
+        require(share <= 1, "task.stand_start + curriculum.reference_start", expected, share)
+        if self.composite is None:
             return
-        flat = "null with composite motion or discriminators, which are on a plane"
-        ok = self.terrain is None or not self.composite.groups
-        require(ok, "terrain", flat, self.terrain)
+        expected = "null with composite motion, which is on a plane"
+        require(self.terrain is None, "terrain", expected, self.terrain)
+        expected = "null with composite motion, which has none"
+        require(self.curriculum is None, "curriculum", expected, "one")
         batch = self.ppo.num_envs * self.ppo.num_steps
         size = self.composite.discriminator.minibatch_size
         seen = round(batch * self.composite.discriminator.share)

@@ -60,8 +60,6 @@ class DiscriminatorConfig:
     # features (m, and numbers of quaternions) that vary by less are not blown up to a std of 1:
     # clips hold many links still, and any noise of the actions would tell the two kinds apart
     least_std: float = number(0.0, least=0, most=100)
-    # windows of earlier rollouts that are kept, and make up half of the simulated ones; 0: none
-    memory: int = number(0, least=0, most=1_000_000)
 
     def __post_init__(self) -> None:
         check_numbers(self, "composite.discriminator")
@@ -73,16 +71,8 @@ class DiscriminatorConfig:
 
 @dataclasses.dataclass(frozen=True)
 class CompositeConfig:
-    """Several objectives, each with a critic of its own [C].
+    """Composite motion instead of getting up: many objectives, each with its own critic [C]."""
 
-    With `task: composite` it replaces the get-up task by composite motion; with `task: getup` the
-    reward terms of getting up, and discriminators for its style, are the objectives.
-    """
-
-    task: str = "composite"  # composite | getup
-    # getup: reward terms that are objectives: total (all of them multiplied), task, height,
-    # orientation, velocity, posture, natural
-    terms: tuple[str, ...] = ("total",)
     groups: dict[str, GroupConfig] = field(default_factory=dict)
     shared_links: tuple[str, ...] = ()  # links that several groups may have
     free_links: tuple[str, ...] = ()  # links that need not be in any group
@@ -95,19 +85,12 @@ class CompositeConfig:
     # what the meta policy sees: all | own: links with clips that it does not know, as they are in
     # its own clips where the other links look most alike
     meta_sees: str = "all"
-    # of the hinges with clips that the meta policy does not know: its share of their targets at
-    # first, which falls to 0 while few episodes end in falls; none in evaluations
-    meta_share: float = number(0.0, least=0, below=1)
     start_group: str | None = None  # episodes start along its clips; None: the last group's
     start_mixed: bool = False  # and with the other groups' hinges from their own clips
     # before training, the actor learns by regression what comes next in the clips, over a meta
     # policy in those that are new; only where training starts from a fresh policy
-    rehearse: bool = False
+    warm_start: bool = False
     episode_s: float = number(10.0, above=0, most=3600)
-    # training episodes are cut at random, on average after this long: more samples near the clips,
-    # where an episode starts and a policy learns to go on with a motion; None: only at episode_s
-    cut_s: float | None = number(None, above=0, most=3600)
-    cut_grows: bool = False  # from cut_s towards episode_s, while few episodes fail before
     # of every objective in the step that ends an episode early
     end_reward: float = number(-1.0, least=-1000, most=1000)
     # a joint centre below it, but for the feet's, is a fall
@@ -125,19 +108,10 @@ class CompositeConfig:
             for name, value in (settings or {}).items():
                 for item in value if isinstance(value, list | tuple) else (value,):
                     check(item, float, _OF_GOALS, f"composite.goals.{goal}.{name}")
-        tasks = ("composite", "getup")
-        require(self.task in tasks, "composite.task", f"one of {tasks}", self.task)
-        if self.task == "getup":
-            self._check_getup()
-        else:
-            require(bool(self.groups), "composite.groups", "at least one group", self.groups)
+        require(bool(self.groups), "composite.groups", "at least one group", self.groups)
         kinds = ("all", "own")
         ok = self.meta_sees in kinds
         require(ok, "composite.meta_sees", f"one of {kinds}", self.meta_sees)
-        ok = self.meta_share == 0 or self.meta is not None
-        require(ok, "composite.meta_share", "0 without composite.meta", self.meta_share)
-        ok = not self.cut_grows or self.cut_s is not None
-        require(ok, "composite.cut_s", "a first time where composite.cut_grows", self.cut_s)
         centres, centre = ("clips", "neutral"), self.action_centre
         ok = centre in centres
         require(ok, "composite.action_centre", f"one of {centres}", centre)
@@ -148,11 +122,3 @@ class CompositeConfig:
         names = tuple(self.groups)
         ok = start is None or start in names
         require(ok, "composite.start_group", f"one of {names}, or null", start)
-
-    def _check_getup(self) -> None:
-        known = ("total", "task", "height", "orientation", "velocity", "posture", "natural")
-        ok = set(self.terms) <= set(known) and len(set(self.terms)) == len(self.terms) > 0
-        require(ok, "composite.terms", f"some of {known}", self.terms)
-        for name, empty in (("goals", {}), ("meta", None), ("rehearse", False)):
-            value = getattr(self, name)
-            require(value == empty, f"composite.{name}", "none while getting up", value)

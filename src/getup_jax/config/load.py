@@ -18,14 +18,8 @@ import yaml
 from getup_jax.config import Config, ConfigError, yaml_text
 from getup_jax.config.check import shown
 from getup_jax.config.convert import Text, describe, section
-from getup_jax.config.earlier import completed
+from getup_jax.config.migration import migrated, refuse_old
 from getup_jax.core.resources import config_path, shipped_configs
-
-# Settings that are no more: what to use instead. What was saved with them is read without them.
-RETIRED = {
-    "ppo.critic_rate_scale": "ppo.critic_learning_rate, which does not follow the actor's",
-    "ppo.value_coefficient": "nothing: the critic has an optimiser of its own",
-}
 
 BASE = "base"  # the key by which a file names another one that it changes
 _DEEPEST = 10  # names in the key of an override
@@ -43,34 +37,29 @@ class BrokenFileError(ConfigError):
 def load_config(path: str | Path | None, overrides: Sequence[str] = ()) -> Config:
     """The defaults, changed by a YAML file (None: by none) and then by overrides.
 
-    A key that a saved config lacks means what was so when it was saved, see config/earlier.py.
+    A saved config means what it did when it was saved, see config/migration.py.
     Raises ConfigError that names the key, or the file and line.
     """
     file = None if path is None else find_config(path)
-    return _build(file, {} if file is None else completed(_read_with_base(file)), overrides)
+    return _build(file, {} if file is None else _migrated(file, _read_with_base(file)), overrides)
 
 
 def load_saved_config(file: Path) -> Config:
-    """What `dump_yaml` wrote, also of an earlier version with settings that are RETIRED now."""
-    values = completed(_read_yaml(file))
-    for key in RETIRED:
-        _remove(values, *key.split("."))
-    return _build(file, values, ())
+    """What `dump_yaml` wrote, also in an earlier version."""
+    return _build(file, _migrated(file, _read_yaml(file)), ())
 
 
-def _remove(values: dict[str, Any], section_name: str, name: str) -> None:
-    inner = values.get(section_name)
-    if isinstance(inner, dict):
-        inner.pop(name, None)
+def _migrated(file: Path, values: dict[str, Any]) -> dict[str, Any]:
+    try:
+        return migrated(values)
+    except ConfigError as error:
+        raise ConfigError(f"{error} (in {file})") from None
 
 
 def _build(file: Path | None, from_file: dict[str, Any], overrides: Sequence[str]) -> Config:
     try:
         merged = functools.reduce(_merge, map(_parse_override, overrides), from_file)
-        for key, instead in RETIRED.items():
-            first, name = key.split(".")
-            if isinstance(merged.get(first), dict) and name in merged[first]:
-                raise ConfigError(f"{key}: is no setting any more; use {instead}")
+        refuse_old(merged)
         return section(merged, Config, "", None)
     except ConfigError as error:
         if file is None or not _is_bad(from_file):

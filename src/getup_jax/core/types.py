@@ -5,7 +5,7 @@ One letter an axis, everywhere in the package:
     B simulations    T steps        K objectives    N samples
     J hinge joints (= actuators)    L links, the root first    P pool rows    Q balls
 
-Units are SI: m, s, kg, N, Nm, rad. World frame: Z up. Quaternions: w x y z.
+ActionDecoder are SI: m, s, kg, N, Nm, rad. World frame: Z up. Quaternions: w x y z.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.config import TaskConfig
+from getup_jax.config import CurriculumConfig, TaskConfig
 from getup_jax.core.types import take
 from getup_jax.envs.getup.build import BuiltTask
 from getup_jax.envs.getup.episode import LYING
@@ -79,7 +79,8 @@ class Starts:
             getups = own.getups(clip)[:1]
             engine = self._task.environment.engine
             size = self._task.environment.action_size
-            flat = FlatStarts(getups, self.character, self._config, self._seed, size)
+            none = CurriculumConfig()
+            flat = FlatStarts(getups, self.character, self._config, none, self._seed, size)
             return build_pool(flat, engine, lambda _: None)
         return self._on_ground(curve, place)
 

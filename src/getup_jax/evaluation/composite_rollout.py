@@ -74,7 +74,7 @@ def without_noise(env: Any) -> Any:
     """The environment; a meta policy, if it has one, acts with its mean, and has handed over."""
     if not isinstance(env, MetaTask):
         return env
-    return dataclasses.replace(env, sample=False, first_share=0.0)
+    return dataclasses.replace(env, sample=False)
 
 
 def task_of(env: Any) -> CompositeTask:

@@ -12,8 +12,8 @@ import jax
 import numpy as np
 
 from getup_jax.config import Config, ConfigError, TaskConfig, TerrainConfig
+from getup_jax.config.task import OWN_POSES
 from getup_jax.envs.getup.build import BuiltTask, build_task
-from getup_jax.envs.getup.curriculum.start_sampler import whole_episodes
 from getup_jax.envs.getup.episode import LAST_S, STAND_LOWEST, STAND_MEAN
 from getup_jax.envs.getup.resets.rag_doll import DROPS
 from getup_jax.evaluation import control_gain
@@ -108,7 +108,7 @@ def evaluation_config(config: Config, scenario: Scenario) -> Config:
         physics = dataclasses.replace(physics, engine=scenario.engine, solver=solver)
     stand_time_s = task.stand_time_s if scenario.stand_time_s is None else scenario.stand_time_s
     task = dataclasses.replace(
-        whole_episodes(task),
+        task,
         stand_start=float(scenario.start == "standing"),
         start_noise_rad=scenario.start_noise_rad,
         terminate_reward=TaskConfig.terminate_reward,
@@ -118,7 +118,7 @@ def evaluation_config(config: Config, scenario: Scenario) -> Config:
     )
     terrain = _evaluation_terrain(config.terrain, scenario.terrain_seed)
     config = dataclasses.replace(
-        config, physics=physics, task=task, terrain=terrain, seed=scenario.seed
+        config, physics=physics, task=task, curriculum=None, terrain=terrain, seed=scenario.seed
     )
     scenario.check(config)
     return config
@@ -127,9 +127,9 @@ def evaluation_config(config: Config, scenario: Scenario) -> Config:
 def _dropped(task: TaskConfig, drops: str | None) -> dict[str, Any]:
     """Settings of the task for bodies that were dropped so; they are not those of the training."""
     if drops is None:
-        return {}
+        return OWN_POSES
     count = _FLAT_DROPS - (task.limp_drops == _FLAT_DROPS)
-    return {"limp_share": 1.0, "limp_drops": count, **DROPPED[drops]}
+    return OWN_POSES | {"limp_share": 1.0, "limp_drops": count} | DROPPED[drops]
 
 
 def _episode_count(config: Config, scenario: Scenario) -> int:

@@ -1,1 +1,1 @@
-"""What a policy is taught by regression before it trains by itself."""
+"""What a policy learns by regression before it trains by itself."""

@@ -21,12 +21,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.config import Config
-from getup_jax.envs.getup.action_decoder import Units
+from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.observation import Observer
 from getup_jax.envs.getup.symmetry import find_symmetry
 from getup_jax.envs.getup.task import GetUpTask, World
 from getup_jax.imitation import action_regression
-from getup_jax.imitation.action_regression import Lesson
+from getup_jax.imitation.action_regression import Demonstrations
 from getup_jax.pose_prior import prior as pose_prior
 from getup_jax.pose_prior.prior import PosePrior
 from getup_jax.rl import normalize
@@ -46,12 +46,12 @@ class Teacher:
 
     model: ActorCritic
     policy: PolicyState
-    units: Units  # what its actions mean
+    decoder: ActionDecoder  # what its actions mean
     observer: Observer  # the layout of what it sees
     lookahead_s: tuple[float, ...]
 
     def act(self, observation: jax.Array) -> jax.Array:
-        """Mean actions [N, A], in its own units, for raw observations [N, O] of its own layout."""
+        """Mean actions [N, A] of its own decoder, for raw observations [N, O] of its own layout."""
         return self.model.mean(self.policy.actor, normalized(self.policy, observation))
 
     def fits(self, learner: Learner) -> bool:
@@ -84,7 +84,7 @@ def make_teacher(
     assert isinstance(env, GetUpTask)
     prior = pose_prior.from_checkpoint(loaded.prior)
     observer = _observer(env, loaded.config, prior)
-    symmetry = find_symmetry(loaded.config, env.character, observer, prior)
+    symmetry = find_symmetry(env.character, observer, prior)
     _check(config, learner, world, loaded, prior, symmetry is not None)
     latents = 0 if prior is None else prior.latent_size
     old = dataclasses.replace(env, observer=observer, symmetry=symmetry, latent_size=latents)
@@ -93,9 +93,9 @@ def make_teacher(
     if not config.train.init_learner:
         template = model.init(jax.random.PRNGKey(0), config.ppo).policy
         policy = from_nested(template, loaded.policy, str(loaded.path))
-    neutral = env.units(world).neutral
-    units = Units(prior, loaded.config.task.offset_scale, neutral)
-    return Teacher(model, policy, units, observer, loaded.config.task.lookahead_s)
+    neutral = env.decoder(world).neutral
+    decoder = ActionDecoder(prior, loaded.config.task.offset_scale, neutral)
+    return Teacher(model, policy, decoder, observer, loaded.config.task.lookahead_s)
 
 
 def _observer(env: GetUpTask, loaded: Config, prior: PosePrior | None) -> Observer:
@@ -166,31 +166,33 @@ def carry_over(
     """
     env = learner.env
     assert isinstance(env, GetUpTask)
-    units, fits = env.units(world), teacher.fits(learner)
-    if fits and teacher.units.same(units):
+    decoder, fits = env.decoder(world), teacher.fits(learner)
+    if fits and teacher.decoder.same(decoder):
         return teacher.policy
-    log("its networks, observation, prior or offsets are others: it teaches those of this run ...")
-    lesson = functools.partial(_lesson, teacher, env, units)
+    log(
+        "its networks, observation, prior or offsets are others: distilling it into this run's ..."
+    )
+    demonstrate = functools.partial(_demonstrate, teacher, env, decoder)
     policy, seen = teacher.policy if fits else own, []
 
     def act(observation: jax.Array) -> jax.Array:
-        return lesson(observation).action
+        return demonstrate(observation).action
 
     rollouts = 1 + math.ceil(_SAMPLES / (learner.config.num_envs * learner.config.num_steps))
     for number, key_round in enumerate(jax.random.split(key, _ROUNDS)):
         key_roll, key_order = jax.random.split(key_round)
-        part = action_regression.watched(learner, env, world, act, lesson, rollouts, key_roll)
-        training, heldout = action_regression.held_out(part, len(part.observation) // rollouts)
+        part = action_regression.collect(learner, env, world, act, demonstrate, rollouts, key_roll)
+        training, heldout = action_regression.split(part, len(part.observation) // rollouts)
         seen.append(training)
         if number == 0:
             statistics = _statistics(teacher, env, training.observation)
             policy = dataclasses.replace(policy, statistics=statistics)
             policy = learner.model.symmetric(policy)
-        before, _ = action_regression.compare(learner, policy, units, heldout)
-        policy = action_regression.taught(
-            learner, policy, units, action_regression.join(seen), key_order
+        before, _ = action_regression.compare(learner, policy, decoder, heldout)
+        policy = action_regression.clone(
+            learner, policy, decoder, action_regression.join(seen), key_order
         )
-        after, offsets = action_regression.compare(learner, policy, units, heldout)
+        after, offsets = action_regression.compare(learner, policy, decoder, heldout)
         log(
             f"round {number + 1} of {_ROUNDS}: its servo targets differ by {after:.2f} degrees "
             f"(rms) now, {before:.1f} before; offsets |dq|_1 {offsets:.1f} rad"
@@ -199,20 +201,22 @@ def carry_over(
     return policy
 
 
-def _lesson(teacher: Teacher, env: GetUpTask, units: Units, observation: jax.Array) -> Lesson:
-    """What the teacher would do, for raw observations [N, O] of the new run, in its units."""
+def _demonstrate(
+    teacher: Teacher, env: GetUpTask, decoder: ActionDecoder, observation: jax.Array
+) -> Demonstrations:
+    """What the teacher would do, for raw observations [N, O] of the new run, as an action of it."""
     condition = env.observer.condition(observation)
     action = observation[..., env.observer.slices()["action"]]
     kept, places = _shared(teacher, env)
     block = teacher.observer.slices()["action"]
     seen = jnp.zeros((*observation.shape[:-1], teacher.observer.size))
     seen = seen.at[..., kept].set(observation[..., places])
-    seen = seen.at[..., block].set(units.translate(action, condition, teacher.units))
+    seen = seen.at[..., block].set(decoder.translate(action, condition, teacher.decoder))
     mean = teacher.act(seen)
-    return Lesson(
+    return Demonstrations(
         observation=observation,
-        action=teacher.units.translate(mean, condition, units),
-        target=teacher.units.target(mean, condition),
+        action=teacher.decoder.translate(mean, condition, decoder),
+        target=teacher.decoder.target(mean, condition),
         condition=condition,
     )
 

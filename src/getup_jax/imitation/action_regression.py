@@ -1,4 +1,4 @@
-"""Lessons: what a policy is taught by regression of servo targets, before it trains by itself."""
+"""Behaviour cloning: servo targets are learned by regression before a policy trains by itself."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import optax
 from flax import struct
 
 from getup_jax.envs.getup import rewards
-from getup_jax.envs.getup.action_decoder import Units
+from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.task import GetUpTask, World
 from getup_jax.networks import gaussian
 from getup_jax.rl.actor_critic import normalized
@@ -28,12 +28,12 @@ _NOISE = 0.2  # standard deviation of the actions, to see what is beside the way
 _EPOCHS, _MINIBATCH = 30, 1024
 _LEARNING_RATES = 1e-3, 1e-5
 # Beside the squared error of the targets (rad^2):
-_NEAR = 0.02  # to the latents of the lesson, since others may decode to the same pose
+_NEAR = 0.02  # to the demonstrated latents, since others may decode to the same pose
 _NATURAL = 0.01  # (|dq|_1 / c)^2 of equation 3: what latents can say, offsets should not
 
 
 @struct.dataclass
-class Lesson:
+class Demonstrations:
     """N observations and what to do there; a pytree of [N, ...]."""
 
     observation: jax.Array  # [N, O] raw, its action in the units of the policy that learns
@@ -42,23 +42,23 @@ class Lesson:
     condition: jax.Array  # [N, 3]
 
 
-def watched(
+def collect(
     learner: Learner,
     env: GetUpTask,
     world: World,
     mean_action: Callable[[jax.Array], jax.Array],
-    lesson: Callable[[jax.Array], Lesson],
+    demonstrate: Callable[[jax.Array], Demonstrations],
     rollouts: int,
     key: jax.Array,
-) -> Lesson:
-    """Lessons from what a policy sees in rollouts that go on from one to the next.
+) -> Demonstrations:
+    """Demonstrations from what a policy sees in rollouts that go on from one to the next.
 
     Args:
         learner: whose numbers of simulations and steps a rollout has.
         env: where the policy acts.
         world: of `env`.
         mean_action: [N, A] of the policy for raw observations [N, O] of `env`, inside jit.
-        lesson: of raw observations [N, O] likewise.
+        demonstrate: what to do there, of raw observations [N, O] likewise.
         rollouts: how many.
         key: of the starts and the noise.
     """
@@ -71,50 +71,57 @@ def watched(
         return action, gaussian.log_prob(action, mean, std)
 
     @jax.jit
-    def collect(world: World, state: Any, key: jax.Array) -> tuple[Any, Lesson]:
+    def roll(world: World, state: Any, key: jax.Array) -> tuple[Any, Demonstrations]:
         collected = rollout(env, world, state, act, key, num_steps)
         observation = collected.transition.observation
         flat = observation.reshape(-1, observation.shape[-1])
-        return collected.environment, lesson(flat)
+        return collected.environment, demonstrate(flat)
 
     keys = jax.random.split(key, rollouts + 1)
     state = jax.jit(env.init, static_argnums=2)(world, keys[0], num_envs)
     parts = []
     for key_roll in keys[1:]:
-        state, part = collect(world, state, key_roll)
+        state, part = roll(world, state, key_roll)
         parts.append(jax.device_get(part))
     return join(parts)
 
 
-def join(parts: list[Lesson]) -> Lesson:
+def join(parts: list[Demonstrations]) -> Demonstrations:
     """All of them in one, in their order."""
     return jax.tree.map(lambda *x: jnp.concatenate(x), *parts)
 
 
-def held_out(lessons: Lesson, size: int) -> tuple[Lesson, Lesson]:
+def split(demos: Demonstrations, size: int) -> tuple[Demonstrations, Demonstrations]:
     """All but the last `size`, and those."""
-    first, last = slice(None, -size), slice(-size, None)
-    return jax.tree.map(lambda x: x[first], lessons), jax.tree.map(lambda x: x[last], lessons)
+    first, last = (
+        jax.tree.map(lambda x, part=part: x[part], demos)
+        for part in (slice(None, -size), slice(-size, None))
+    )
+    return first, last
 
 
-def taught(
-    learner: Learner, policy: PolicyState, units: Units, lessons: Lesson, key: jax.Array
+def clone(
+    learner: Learner,
+    policy: PolicyState,
+    decoder: ActionDecoder,
+    demos: Demonstrations,
+    key: jax.Array,
 ) -> PolicyState:
     """The policy after regression of its targets, with latents as far as they can say them."""
-    latents, limit = units.latent_size, learner.env.config.offset_limit_rad
+    latents, limit = decoder.latent_size, learner.env.config.offset_limit_rad
 
-    def loss(actor: Any, part: Lesson) -> tuple[jax.Array, dict[str, jax.Array]]:
+    def loss(actor: Any, part: Demonstrations) -> tuple[jax.Array, dict[str, jax.Array]]:
         seen = normalized(policy, part.observation)
         action = learner.model.mean(actor, seen)
-        miss = jnp.mean(jnp.square(units.target(action, part.condition) - part.target))
+        miss = jnp.mean(jnp.square(decoder.target(action, part.condition) - part.target))
         (latent, offset), (near, _) = (jnp.split(a, [latents], -1) for a in (action, part.action))
-        if units.prior is None:
+        if decoder.prior is None:
             return miss, {"miss": miss}
         far = jnp.mean(jnp.square(latent - near))
-        unnatural = jnp.mean(1.0 - rewards.natural(units.offset_scale * offset, limit))
+        unnatural = jnp.mean(1.0 - rewards.natural(decoder.offset_scale * offset, limit))
         return miss + _NEAR * far + _NATURAL * unnatural, {"miss": miss}
 
-    actor = regress(loss, policy.actor, lessons, key, _EPOCHS, _MINIBATCH)
+    actor = regress(loss, policy.actor, demos, key, _EPOCHS, _MINIBATCH)
     return dataclasses.replace(policy, actor=actor)
 
 
@@ -144,11 +151,11 @@ def regress(
 
 
 def compare(
-    learner: Learner, policy: PolicyState, units: Units, lessons: Lesson
+    learner: Learner, policy: PolicyState, decoder: ActionDecoder, demos: Demonstrations
 ) -> tuple[float, float]:
-    """How far the policy's servo targets are from the lessons' (degrees, rms), and |dq|_1 (rad)."""
-    action = jax.jit(learner.act)(policy, lessons.observation)
-    miss = jnp.mean(jnp.square(units.target(action, lessons.condition) - lessons.target))
-    offset = units.offset_scale * action[:, units.latent_size :]
+    """How far the policy's servo targets are from the demos' (degrees, rms), and |dq|_1 (rad)."""
+    action = jax.jit(learner.act)(policy, demos.observation)
+    miss = jnp.mean(jnp.square(decoder.target(action, demos.condition) - demos.target))
+    offset = decoder.offset_scale * action[:, decoder.latent_size :]
     length = jnp.mean(jnp.sum(jnp.abs(offset), axis=-1))
     return math.degrees(math.sqrt(miss)), float(length)

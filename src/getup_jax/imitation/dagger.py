@@ -1,4 +1,4 @@
-"""Rehearsal of composite motion: the actor learns what comes next in the clips, before training.
+"""DAgger warm start of composite motion: the actor learns what comes next in the clips, before training.
 
 A fresh actor holds the clips' mean pose. Each step of learning from there first ends fewer falls,
 and a character that stands still falls least: it comes to rest in some pose of the clips, where the
@@ -8,8 +8,7 @@ pose: in the states that it gets to itself when it starts on the clips (Ross et 
 reduction of imitation learning ... to no-regret online learning). Where there are clips along
 arcs, it learns to go on with the one that turns to the goal's target. Balance is left to training.
 
-Over a meta policy it learns the clips that are new, and to leave the other hinges to that policy:
-in states with all of `composite.meta_share` first, and with less of it in every round.
+Over a meta policy it learns the clips that are new, and to leave the other hinges to that policy.
 """
 
 from __future__ import annotations
@@ -35,13 +34,13 @@ from getup_jax.rl.state import PolicyState
 Log = Callable[[str], None]
 
 _ROUNDS = 4  # of playing and learning; in the first one the clips' own targets are played
-_TURN_S = 1.0  # a target is so long away from straight ahead, at the turn rate of the lesson
+_TURN_S = 1.0  # a target is so long away from straight ahead, at the turn rate that is learned
 _LOOK_STEPS = 2  # a state is kept every so many steps
 _EPOCHS, _MINIBATCH = 20, 256
 _STD = 0.01  # weight of (log std - the first one)^2 beside the squared error (rad^2)
 
 
-class Rehearsed(NamedTuple):
+class Labelled(NamedTuple):
     """N states and what to do there."""
 
     observation: Any  # [N, O] raw
@@ -49,33 +48,32 @@ class Rehearsed(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Stage:
-    """Where it is rehearsed."""
+class Setup:
+    """What the actor is warmed up for."""
 
     built: BuiltComposite
     world: Any  # of the learner's environment: the task's, or with a meta policy
     new: np.ndarray | None = None  # [A] hinges that the meta policy does not know; None: no policy
 
 
-def rehearse(
-    learner: Learner, stage: Stage, policy: PolicyState, key: jax.Array, log: Log
+def warm_start(
+    learner: Learner, setup: Setup, policy: PolicyState, key: jax.Array, log: Log
 ) -> PolicyState:
     """The policy with an actor that goes on with the clips, and statistics of what it saw."""
-    built = stage.built
-    log("rehearsing: teaching the actor what comes next in the clips ...")
+    built = setup.built
+    log("warm start: the actor learns what comes next in the clips ...")
     targets = clip_targets(built)
-    parts: list[Rehearsed] = []
+    parts: list[Labelled] = []
     before = math.nan
     for number, key_round in enumerate(jax.random.split(key, _ROUNDS)):
         key_play, key_order = jax.random.split(key_round)
-        left = 1.0 - number / (_ROUNDS - 1)
-        part = _play(learner, stage, policy, targets, key_play, own=number > 0, left=left)
+        part = _play(learner, setup, policy, targets, key_play, own=number > 0)
         parts.append(part)
         if number == 0:
             policy = observe(policy, jnp.asarray(part.observation), learner.model.symmetry)
         before = _miss(learner, built.world, policy, part)
-        everything = Rehearsed(*(np.concatenate(x) for x in zip(*parts, strict=True)))
-        policy = _taught(learner, built.world, policy, everything, key_order)
+        everything = Labelled(*(np.concatenate(x) for x in zip(*parts, strict=True)))
+        policy = _clone(learner, built.world, policy, everything, key_order)
     after = _miss(learner, built.world, policy, parts[-1])
     log(
         f"its servo targets miss those of the clips by {after:.1f} degrees (rms), {before:.1f} in "
@@ -100,47 +98,41 @@ def clip_targets(built: BuiltComposite) -> np.ndarray:
 
 def _play(
     learner: Learner,
-    stage: Stage,
+    setup: Setup,
     policy: PolicyState,
     targets: np.ndarray,
     key: jax.Array,
     own: bool,
-    left: float,
-) -> Rehearsed:
-    """States on the way from starts on the clips, by the actor's own actions or the clips'.
-
-    left: of the share that a meta policy has in the hinges with new clips.
-    """
-    built, world = stage.built, stage.built.world
+) -> Labelled:
+    """States on the way from starts on the clips, by the actor's own actions or the clips'."""
+    built, world = setup.built, setup.built.world
     env: Any = learner.env  # CompositeTask, or MetaTask around it
     std = learner.model.initial_std or learner.config.action_std[-1]
     key_row, key_start, key_noise, key_arc = jax.random.split(key, 4)
     row = jax.random.randint(key_row, (learner.config.num_envs,), 0, len(targets))
     arc = jax.random.randint(key_arc, row.shape, 0, targets.shape[1])
-    state = _BEGIN(built.environment, env, world, stage.world, row, key_start)
-    if stage.new is not None:
-        state = env.handed_over(state, left)
+    state = _BEGIN(built.environment, env, world, setup.world, row, key_start)
     way = (targets[row, arc] - np.asarray(world.target_centre)) / np.asarray(world.target_scale)
     act = jax.jit(learner.act)
     goes_on = np.ones(len(row), bool)
-    kept: list[Rehearsed] = []
+    kept: list[Labelled] = []
     for step, key_step in enumerate(jax.random.split(key_noise, way.shape[1])):
         goes_on &= np.isfinite(way[:, step]).all(axis=-1)
         action = jnp.asarray(np.nan_to_num(way[:, step]), jnp.float32)
-        if stage.new is None:
+        if setup.new is None:
             bearing = _bearings(built.following.turns, np.asarray(arc), key_step)
-            state = _TURN(env, stage.world, state, built.environment.goals, bearing)
+            state = _TURN(env, setup.world, state, built.environment.goals, bearing)
         else:
-            action = jnp.where(stage.new, action, state.observation[:, -env.action_size :])
+            action = jnp.where(setup.new, action, state.observation[:, -env.action_size :])
         if step % _LOOK_STEPS == 0:
             seen = np.asarray(state.observation)[goes_on]
-            kept.append(Rehearsed(seen, np.asarray(action)[goes_on]))
+            kept.append(Labelled(seen, np.asarray(action)[goes_on]))
         if own:
             action = act(policy, state.observation)
         action = gaussian.sample(key_step, action, jnp.full_like(action, std))
-        state, fell = _STEP(env, stage.world, state, action)
+        state, fell = _STEP(env, setup.world, state, action)
         goes_on &= ~np.asarray(fell)
-    return Rehearsed(*(np.concatenate(x) for x in zip(*kept, strict=True)))
+    return Labelled(*(np.concatenate(x) for x in zip(*kept, strict=True)))
 
 
 def _bearings(turns: np.ndarray, arc: np.ndarray, key: jax.Array) -> jax.Array:
@@ -184,17 +176,17 @@ def _step(env: Any, world: Any, state: Any, action: jax.Array) -> tuple[Any, jax
 _STEP = jax.jit(_step, static_argnums=0)
 
 
-def _taught(
+def _clone(
     learner: Learner,
     world: CompositeWorld,
     policy: PolicyState,
-    seen: Rehearsed,
+    seen: Labelled,
     key: jax.Array,
 ) -> PolicyState:
     """The policy after regression of its mean actions; its std stays near the first one."""
     first = math.log(learner.model.initial_std or 1.0)
 
-    def loss(actor: Any, part: Rehearsed) -> tuple[jax.Array, dict[str, jax.Array]]:
+    def loss(actor: Any, part: Labelled) -> tuple[jax.Array, dict[str, jax.Array]]:
         observation = normalized(policy, part.observation)
         mean, std = learner.model.distribution(actor, observation, jnp.ones(()))
         miss = jnp.mean(jnp.square(world.target_scale * (mean - part.action)))
@@ -204,7 +196,7 @@ def _taught(
     return dataclasses.replace(policy, actor=actor)
 
 
-def _miss(learner: Learner, world: CompositeWorld, policy: PolicyState, seen: Rehearsed) -> float:
+def _miss(learner: Learner, world: CompositeWorld, policy: PolicyState, seen: Labelled) -> float:
     """How far its servo targets are from those of the clips (degrees, rms)."""
     action = jax.jit(learner.act)(policy, jnp.asarray(seen.observation))
     miss = jnp.mean(jnp.square(world.target_scale * (action - seen.action)))

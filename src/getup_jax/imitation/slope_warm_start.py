@@ -23,13 +23,13 @@ import numpy as np
 from getup_jax.envs.getup.episode import STANDING, EpisodeState
 from getup_jax.envs.getup.task import GetUpTask, World
 from getup_jax.imitation import action_regression
-from getup_jax.imitation.action_regression import Lesson, Log
+from getup_jax.imitation.action_regression import Demonstrations, Log
 from getup_jax.rl.learner import Learner
 from getup_jax.rl.state import PolicyState
 
 # rollouts of the policy on the flat and on slopes, and batches of poses that are held
 _OWN, _RISING, _HELD = 6, 4, 8
-_HOLD_STEPS, _LOOK_STEPS = 60, 3  # how long they are, and how often a lesson is taken from it
+_HOLD_STEPS, _LOOK_STEPS = 60, 3  # how long they are, and how often one is taken as a demonstration
 _PUSH, _PUSH_STEPS = 0.3, 20  # standard deviation of all actions, kept for so many steps
 _FLAT_ONLY = {"curriculum": "success", "unlock_successes": 10**9}  # nothing else opens
 _ALL_OPEN = {"curriculum": "none"}
@@ -39,41 +39,41 @@ _STRETCHED = ("neck_flex", "head_flex")  # to their lower limits
 _SUNK_M = 0.1  # of the neck: from there on it falls
 
 
-def teach_footing(
+def warm_start_on_slopes(
     learner: Learner, world: World, policy: PolicyState, key: jax.Array, log: Log
 ) -> PolicyState:
     """The policy with an actor that turns its feet to the slope where it stands."""
     env = learner.env
     assert isinstance(env, GetUpTask)
     assert env.terrain is not None
-    units = env.units(world)
+    decoder = env.decoder(world)
     log("it has trained on a plane: teaching it to stand on slopes ...")
     keys = jax.random.split(key, _HELD + 3)
 
-    def as_it_is(observation: jax.Array) -> Lesson:
+    def as_it_is(observation: jax.Array) -> Demonstrations:
         condition = env.observer.condition(observation)
         action = learner.act(policy, env.observer.evened(observation))
-        return Lesson(observation, action, units.target(action, condition), condition)
+        return Demonstrations(observation, action, decoder.target(action, condition), condition)
 
     plane = dataclasses.replace(env, terrain=dataclasses.replace(env.terrain, **_FLAT_ONLY))
     act = functools.partial(learner.act, policy)
-    own = action_regression.watched(learner, plane, world, act, as_it_is, _OWN, keys[0])
+    own = action_regression.collect(learner, plane, world, act, as_it_is, _OWN, keys[0])
     anywhere = dataclasses.replace(env, terrain=dataclasses.replace(env.terrain, **_ALL_OPEN))
     stretched = _stretched(env)
 
-    def head_up(observation: jax.Array) -> Lesson:
-        lesson = as_it_is(observation)
-        return lesson.replace(target=stretched(lesson.target, lesson.condition))
+    def head_up(observation: jax.Array) -> Demonstrations:
+        demos = as_it_is(observation)
+        return demos.replace(target=stretched(demos.target, demos.condition))
 
-    rising = action_regression.watched(learner, anywhere, world, act, head_up, _RISING, keys[2])
+    rising = action_regression.collect(learner, anywhere, world, act, head_up, _RISING, keys[2])
     low = np.asarray(rising.condition[:, 0]) < _RISES * float(np.max(world.points[:, -1, 0]))
     rising = jax.tree.map(lambda x: x[low], rising)
     held = [_held(learner, env, world, k) for k in keys[3:]]
     training = action_regression.join([own, rising, *held[:-1]])
-    before, _ = action_regression.compare(learner, policy, units, held[-1])
-    policy = action_regression.taught(learner, policy, units, training, keys[1])
-    after, _ = action_regression.compare(learner, policy, units, held[-1])
-    flat, slope = (action_regression.compare(learner, policy, units, x)[0] for x in (own, rising))
+    before, _ = action_regression.compare(learner, policy, decoder, held[-1])
+    policy = action_regression.clone(learner, policy, decoder, training, keys[1])
+    after, _ = action_regression.compare(learner, policy, decoder, held[-1])
+    flat, slope = (action_regression.compare(learner, policy, decoder, x)[0] for x in (own, rising))
     log(
         f"its servo targets on slopes miss the held pose by {after:.2f} degrees (rms), "
         f"{before:.1f} before; they moved by {flat:.2f} on the flat, by {slope:.2f} rising from "
@@ -94,19 +94,23 @@ def _stretched(env: GetUpTask) -> Callable[[jax.Array, jax.Array], jax.Array]:
     return stretched
 
 
-def _held(learner: Learner, env: GetUpTask, world: World, key: jax.Array) -> Lesson:
+def _held(learner: Learner, env: GetUpTask, world: World, key: jax.Array) -> Demonstrations:
     """Standing poses on irregular ground, swaying as their servo targets are pushed about."""
     observation, action = jax.device_get(_sway(learner.config.num_envs, env, world, key))
     height = observation[..., env.observer.slices()["features"]][..., 0]
     stands = np.abs(height - height[:1]) < _SUNK_M
     observation, action = jnp.asarray(observation[stands]), jnp.asarray(action[stands])
-    return _lesson(env, world, observation, action)
+    return _demonstrate(env, world, observation, action)
 
 
 @functools.partial(jax.jit, static_argnums=0)
-def _lesson(env: GetUpTask, world: World, observation: jax.Array, action: jax.Array) -> Lesson:
+def _demonstrate(
+    env: GetUpTask, world: World, observation: jax.Array, action: jax.Array
+) -> Demonstrations:
     condition = env.observer.condition(observation)
-    return Lesson(observation, action, env.units(world).target(action, condition), condition)
+    return Demonstrations(
+        observation, action, env.decoder(world).target(action, condition), condition
+    )
 
 
 def _sway(size: int, env: GetUpTask, world: World, key: jax.Array) -> tuple[jax.Array, jax.Array]:

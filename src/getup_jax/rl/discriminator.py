@@ -19,9 +19,6 @@ from getup_jax.rl import normalize
 from getup_jax.rl.minibatch import run_minibatches, shuffled_minibatches
 from getup_jax.rl.normalize import Moments
 
-RENEWED = 0.01  # share of the memory that an update replaces
-_REMEMBER = 4  # folded into a key, so that runs without a memory draw what they did
-
 
 class Ensemble(nn.Module):
     """Windows x[..., F, D] to the outputs [..., N] of N discriminators that share their layers."""
@@ -44,7 +41,6 @@ class DiscriminatorState:
     variables: Any
     optimiser: Any
     statistics: Moments  # [D] of the frames, simulated and recorded alike
-    memory: jax.Array | None = None  # [M, F, D] simulated windows of earlier rollouts; None: none
 
 
 @struct.dataclass
@@ -76,9 +72,6 @@ class Discriminator:
             variables=variables,
             optimiser=self._optimiser().init(variables),
             statistics=normalize.initial(size),
-            memory=jnp.zeros((self.config.memory, num_frames, size))
-            if self.config.memory
-            else None,
         )
 
     def update(
@@ -86,7 +79,6 @@ class Discriminator:
     ) -> tuple[DiscriminatorState, dict[str, jax.Array]]:
         """Statistics, then one pass over simulated and recorded windows [N, F, D]."""
         key_share, key_order = jax.random.split(key)
-        fake, memory = self._remember(state, fake, jax.random.fold_in(key, _REMEMBER))
         seen = jnp.concatenate([fake, real]).reshape(-1, fake.shape[-1])
         statistics = normalize.update(state.statistics, seen)
         pairs = Pairs(
@@ -99,30 +91,7 @@ class Discriminator:
         variables, optimiser, metrics = run_minibatches(
             self._loss, self._optimiser(), state.variables, state.optimiser, pairs, rows
         )
-        return DiscriminatorState(variables, optimiser, statistics, memory), metrics
-
-    def _remember(
-        self, state: DiscriminatorState, fake: jax.Array, key: jax.Array
-    ) -> tuple[jax.Array, jax.Array | None]:
-        """Simulated windows [N, F, D] to learn from, and the memory with some of the new ones.
-
-        Against the newest policy alone, a policy that stands still in one pose is best answered
-        by another pose to stand still in, and so on in turn: each is forgotten when it is left.
-        """
-        memory = state.memory
-        if memory is None:
-            return fake, None
-        key_old, key_row, key_new = jax.random.split(key, 3)
-        first = state.statistics.count == 0
-        filled = fake[jax.random.randint(key_old, memory.shape[:1], 0, len(fake))]
-        memory = jnp.where(first, filled, memory)
-        half = len(fake) // 2
-        old = memory[jax.random.randint(key_old, (half,), 0, len(memory))]
-        order = jax.random.permutation(key_new, len(fake))
-        renewed = min(len(fake), max(1, round(RENEWED * len(memory))))
-        row = jax.random.randint(key_row, (renewed,), 0, len(memory))
-        memory = memory.at[row].set(fake[order[:renewed]])
-        return jnp.concatenate([fake[order[half:]], old]), memory
+        return DiscriminatorState(variables, optimiser, statistics), metrics
 
     def score(self, state: DiscriminatorState, windows: jax.Array) -> jax.Array:
         """The reward [...] of windows [..., F, D]."""

@@ -128,7 +128,7 @@ def load_policy(path: str | Path) -> LoadedPolicy:
 def export_policy(source: str | Path, destination: str | Path) -> Path:
     """Copy only the policy item of a checkpoint to a folder that `load_policy` reads.
 
-    Its config names nothing that only the training's machine has: no found paths, no earlier run,
+    Its config names nothing that only the training's machine has: no archived states, no other run,
     no engine.
     """
     loaded, destination = load_policy(source), Path(destination)
@@ -136,10 +136,12 @@ def export_policy(source: str | Path, destination: str | Path) -> Path:
         raise CheckpointError(f"{destination}: exists and is no checkpoint; choose another folder")
     item = {"policy": loaded.policy, "prior": loaded.prior}
     items = {POLICY: item if loaded.critic is None else {**item, "critic": loaded.critic}}
-    task = dataclasses.replace(loaded.config.task, paths=None)
+    curriculum = loaded.config.curriculum
+    if curriculum is not None:
+        curriculum = dataclasses.replace(curriculum, archive=None)
     train = dataclasses.replace(loaded.config.train, init_from=None, init_learner=False)
     physics = dataclasses.replace(loaded.config.physics, engine="auto")
-    config = dataclasses.replace(loaded.config, physics=physics, task=task, train=train)
+    config = dataclasses.replace(loaded.config, physics=physics, curriculum=curriculum, train=train)
     _write(destination, items, config, loaded.metadata, MAX_EXPORT_BYTES)
     return destination
 

@@ -12,7 +12,7 @@ from getup_jax.runtime.console import Display
 from getup_jax.runtime.metric_file import MetricsWriter
 
 
-class Journal:
+class MetricLog:
     """Collects the metrics of iterations and logs their means with the speed.
 
     Args:

@@ -18,7 +18,7 @@ from getup_jax.rl.state import owned
 from getup_jax.runtime import checkpoint
 from getup_jax.runtime.console import Display, count, duration
 from getup_jax.runtime.metric_file import MetricsWriter
-from getup_jax.runtime.metric_log import Journal
+from getup_jax.runtime.metric_log import MetricLog
 from getup_jax.runtime.pytree_store import CheckpointError, from_nested, is_finite, to_nested
 from getup_jax.runtime.signals import StopRequest
 
@@ -85,17 +85,17 @@ class Loop:
     def train(self, writer: MetricsWriter, stop: StopRequest) -> None:
         """Iterate to the end or to a signal; then save."""
         config = self._config.train
-        journal = Journal(writer, self._display, steps_per_iteration(self._config), self.done)
+        metric_log = MetricLog(writer, self._display, steps_per_iteration(self._config), self.done)
         saved_at = time.monotonic()
         self._display.start(self.steps)
         while self.done < num_iterations(self._config) and stop.signal is None:
-            self._iterate(journal)
+            self._iterate(metric_log)
             if self.done % config.log_every == 0:
-                journal.flush(self.done)
+                metric_log.flush(self.done)
             if time.monotonic() - saved_at >= config.save_every_s:
                 self._save_if_possible()
                 saved_at = time.monotonic()
-        journal.flush(self.done)
+        metric_log.flush(self.done)
         self._save()
 
     def _restore(self) -> None:
@@ -155,12 +155,12 @@ class Loop:
         self._display.log(f"compiled in {duration(time.monotonic() - begin)}; training")
         return compiled
 
-    def _iterate(self, journal: Journal) -> None:
+    def _iterate(self, metric_log: MetricLog) -> None:
         self._state, metrics = self._step(self._world, self._state)
         self.done += 1
-        bad = journal.add({name: float(x) for name, x in jax.device_get(metrics).items()})
+        bad = metric_log.add({name: float(x) for name, x in jax.device_get(metrics).items()})
         if bad:
-            journal.flush(self.done)
+            metric_log.flush(self.done)
             raise self._error(f"{', '.join(bad)}: not a finite number")
 
     def _save_if_possible(self) -> None:

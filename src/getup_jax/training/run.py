@@ -18,11 +18,10 @@ from getup_jax.envs.composite.meta.chain import with_meta
 from getup_jax.envs.composite.meta.meta_policy import MetaTask
 from getup_jax.envs.getup.build import build_task
 from getup_jax.envs.getup.episode import with_shared
-from getup_jax.envs.getup.styled import with_objectives
 from getup_jax.envs.getup.task import World
 from getup_jax.imitation import action_distillation
-from getup_jax.imitation.dagger import Stage, rehearse
-from getup_jax.imitation.slope_warm_start import teach_footing
+from getup_jax.imitation.dagger import Setup, warm_start
+from getup_jax.imitation.slope_warm_start import warm_start_on_slopes
 from getup_jax.physics.body_digest import body_digest
 from getup_jax.rl.learner import Learner, make_learner
 from getup_jax.rl.state import PolicyState
@@ -50,18 +49,13 @@ def build_job(config: Config, log: Log) -> Job:
     """The task and the learner that the settings ask for."""
     if config.composite_motion:
         return build_composite_job(config, log)[1]
-    task, objectives = build_task(config, log), None
-    weights = tuple(task.environment.objective_weights.values())
-    if config.composite is not None:
-        task = styled = with_objectives(config, task, log)
-        objectives, weights = make_discriminator_rewards(styled.environment, config.composite), None
+    task = build_task(config, log)
     learner = make_learner(
         task.environment,
         config.network,
         config.ppo,
         total_steps=config.train.total_steps,
-        weights=weights,
-        reward_model=objectives,
+        weights=tuple(task.environment.objective_weights.values()),
     )
     carry_over = _carry_over(learner, task.world, config)
     body = body_digest(task.environment.character.model)
@@ -76,7 +70,7 @@ def _carry_over(learner: Learner, world: World, config: Config) -> CarryOver:
         on_plane = learner.env.terrain is None or loaded.config.terrain is not None
         if world.prior is None or on_plane:
             return policy
-        return teach_footing(learner, world, policy, key, log)
+        return warm_start_on_slopes(learner, world, policy, key, log)
 
     return carry_over
 
@@ -96,18 +90,18 @@ def build_composite_job(config: Config, log: Log) -> tuple[BuiltComposite, Job]:
         reward_model=make_discriminator_rewards(built.environment, composite),
     )
     prepare = None
-    if composite.rehearse:
-        prepare = functools.partial(_rehearse, learner, built, world, config.seed)
+    if composite.warm_start:
+        prepare = functools.partial(_warm_start, learner, built, world, config.seed)
     body = body_digest(built.environment.character.model)
     return built, Job(learner=learner, world=world, prior=None, prepare=prepare, body=body)
 
 
-def _rehearse(
+def _warm_start(
     learner: Learner, built: BuiltComposite, world: Any, seed: int, policy: PolicyState, log: Log
 ) -> PolicyState:
     env = learner.env
     new = np.array(env.new) if isinstance(env, MetaTask) else None
-    return rehearse(learner, Stage(built, world, new), policy, jax.random.PRNGKey(seed), log)
+    return warm_start(learner, Setup(built, world, new), policy, jax.random.PRNGKey(seed), log)
 
 
 def run(

@@ -90,7 +90,7 @@ class Finder:
         condition = curves.evaluate(
             world.points[style], jnp.asarray(np.minimum(time / duration, 1.0), jnp.float32)
         )
-        action = env.units(world).nearest(angles, condition)
+        action = env.decoder(world).nearest(angles, condition)
         frame = np.minimum(time[1:] * motion.clip.fps, last).round().astype(int)
         links = link_positions(motion.clip, env.character)[frame]
         trust = np.clip(2.0 - motion.gap[frame], _LEAST_TRUST, 1.0)

@@ -104,7 +104,7 @@ def start_states(
     again = [resampled(repeated(clip, 2), 1.0 / engine.control_dt) for clip in clips[start]]
     moving: list[Family] = list(families(again, turns))
     after = moving
-    if len(config.groups) > 1 and (config.start_mixed or config.rehearse):
+    if len(config.groups) > 1 and (config.start_mixed or config.warm_start):
         after = mixed(moving, start, config, character, clips)
         moving = after if config.start_mixed else repeated_as(after, moving)
     return clip_starts(moving, turns, character, engine, most, after)

@@ -12,7 +12,6 @@ from getup_jax.config import CompositeConfig
 from getup_jax.envs.composite.groups import Group, objective_weights
 from getup_jax.envs.composite.reference_windows import sample
 from getup_jax.envs.composite.task import CompositeTask
-from getup_jax.envs.getup.styled import StyledGetUp
 from getup_jax.rl.discriminator import Discriminator, DiscriminatorState
 from getup_jax.rl.rollout import Transition
 
@@ -87,10 +86,8 @@ class DiscriminatorRewards:
         return jnp.sum(jnp.asarray(self.weights) * rewards, axis=-1, keepdims=True)
 
 
-def make_discriminator_rewards(
-    env: CompositeTask | StyledGetUp, config: CompositeConfig
-) -> DiscriminatorRewards:
-    """The objectives of a composite task, or of getting up with several."""
+def make_discriminator_rewards(env: CompositeTask, config: CompositeConfig) -> DiscriminatorRewards:
+    """The objectives of a composite task."""
     return DiscriminatorRewards(
         names=env.objectives,
         weights=objective_weights(config, env.objectives),

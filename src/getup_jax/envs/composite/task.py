@@ -21,11 +21,9 @@ from getup_jax.envs.composite.goals.goal import GoalOutput
 from getup_jax.envs.composite.groups import Group
 from getup_jax.envs.composite.link_frames import FRAMES, LINK_STATE, link_state, observe
 from getup_jax.envs.composite.reference_windows import References, nearest, travel
-from getup_jax.envs.getup.curriculum import cuts
 from getup_jax.physics.character import CharacterSpec
 
 _RESET_CHUNK = 32
-_CUT = 1  # folded into a key, so that tasks without cuts draw what they did
 
 
 @struct.dataclass
@@ -60,7 +58,6 @@ class CompositeState:
     attempts: jax.Array  # [B, G] attempts at each goal that ended in this episode
     successes: jax.Array  # [B, G] those that succeeded
     key: Any
-    cut_s: Any = None  # [] mean time to a random end, where it grows; None: the setting
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -102,8 +99,7 @@ class CompositeTask:
         """B fresh episodes."""
         key_row, key_start, key_state = jax.random.split(key, 3)
         row = self._draw(world, key_row, num_envs)
-        first_s = jnp.asarray(self.config.cut_s, jnp.float32) if self.config.cut_grows else None
-        return self.start(world, row, key_start).replace(key=key_state, cut_s=first_s)
+        return self.start(world, row, key_start).replace(key=key_state)
 
     def stagger(self, state: CompositeState, key: jax.Array) -> CompositeState:
         """Episodes [B] as if they had begun at any time before."""
@@ -139,11 +135,9 @@ class CompositeTask:
             # the first index of a chunk is in no other
             return self.start(world, drawn[index], jax.random.fold_in(key_start, index[0]))
 
-        cut_s, metrics = self._next_cut(after.cut_s, output)
-        after = replace_rows(after.replace(key=None, cut_s=None), done, fresh, _RESET_CHUNK)
-        after = after.replace(key=key_next, cut_s=cut_s)
-        output = output.replace(observation=after.observation, metrics=output.metrics | metrics)
-        return after, output
+        after = replace_rows(after.replace(key=None), done, fresh, _RESET_CHUNK)
+        after = after.replace(key=key_next)
+        return after, output.replace(observation=after.observation)
 
     def advance(
         self, world: CompositeWorld, state: CompositeState, action: jax.Array
@@ -168,26 +162,7 @@ class CompositeTask:
             key=key,
             **_count(state, goal_outputs),
         )
-        output = self._output(world, state, goal_outputs)
-        return state, self._cut(state.cut_s, output, jax.random.fold_in(key_goals, _CUT))
-
-    def _cut(self, mean_s: jax.Array | None, output: StepOutput, key: jax.Array) -> StepOutput:
-        """Ends some episodes at random, mean_s (None: the setting) after their start on average."""
-        average_s = self.config.cut_s if mean_s is None else mean_s
-        if average_s is None:
-            return output
-        chance = jnp.asarray(self.engine.control_dt / average_s)
-        return output.replace(truncated=cuts.cut(output.truncated, output.terminated, chance, key))
-
-    def _next_cut(
-        self, mean_s: jax.Array | None, output: StepOutput
-    ) -> tuple[jax.Array | None, dict[str, jax.Array]]:
-        """The mean time to a cut after a step, and what to log of it."""
-        least_s, most_s = self.config.cut_s, self.config.episode_s
-        if mean_s is None or least_s is None:
-            return mean_s, {}
-        mean_s = cuts.followed(mean_s, output.terminated, output.truncated, least_s, most_s)
-        return mean_s, {"cut_s": jnp.broadcast_to(mean_s, output.terminated.shape)}
+        return state, self._output(world, state, goal_outputs)
 
     def _output(
         self, world: CompositeWorld, state: CompositeState, goals: tuple[GoalOutput, ...]

@@ -14,7 +14,7 @@ from getup_jax.pose_prior.prior import PosePrior
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Units:
+class ActionDecoder:
     """From actions to servo targets, q = decoder(z, c) + scale * offset, and back."""
 
     prior: PosePrior | None  # None: offsets alone, from `neutral`
@@ -94,11 +94,11 @@ class Units:
             return angles[..., :0]
         return pose_prior.encode_action(self.prior, angles, condition)
 
-    def translate(self, action: jax.Array, condition: jax.Array, new: Units) -> jax.Array:
+    def translate(self, action: jax.Array, condition: jax.Array, new: ActionDecoder) -> jax.Array:
         """The action [..., A'] in other units that has the servo target of this one [..., A]."""
         return new.action(self.pose(action, condition), self.target(action, condition), condition)
 
-    def same(self, other: Units) -> bool:
+    def same(self, other: ActionDecoder) -> bool:
         """Whether an action means the same in both."""
         if self.offset_scale != other.offset_scale:
             return False
@@ -106,5 +106,5 @@ class Units:
         return len(ours) == len(theirs) and all(map(np.array_equal, ours, theirs))
 
 
-def _arrays(units: Units) -> object:
+def _arrays(units: ActionDecoder) -> object:
     return units.neutral if units.prior is None else pose_prior.to_dict(units.prior)

@@ -10,10 +10,10 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from getup_jax.config import Config, ConfigError, MotionConfig, TaskConfig, TerrainConfig
+from getup_jax.config import Config, ConfigError, MotionConfig, TerrainConfig
 from getup_jax.core.resources import asset_path, cache_dir
+from getup_jax.envs.getup.curriculum.curriculum import Curriculum
 from getup_jax.envs.getup.observation import Observer
-from getup_jax.envs.getup.resets import misfit
 from getup_jax.envs.getup.resets.lying_bodies import LimpBodies
 from getup_jax.envs.getup.resets.pool import FlatStarts, build_pool
 from getup_jax.envs.getup.resets.region_pool import Site, build_region_pool
@@ -71,7 +71,7 @@ def build_task(
     if choose is not None:
         getups = choose(getups, character)
         log(f"motions: {len(getups)} styles made of them")
-    say_which_lie(getups, config.task, log)
+    say_which_lie(getups, config, log)
     return assemble(config, character, getups, prior, log)
 
 
@@ -86,14 +86,15 @@ def _pose_set(poses: np.ndarray, motion: MotionConfig, character: CharacterSpec)
     return make_pose_set(poses, character, mirrored=motion.mirror)
 
 
-def say_which_lie(getups: Sequence[GetUp], config: TaskConfig, log: Callable[[str], None]) -> None:
+def say_which_lie(getups: Sequence[GetUp], config: Config, log: Callable[[str], None]) -> None:
     """Warn of curves that lie on the floor for longer than the head may."""
     lying = {getup.name: flat_time(getup) for getup in getups}
     found = [f"{name} ({seconds:.1f} s)" for name, seconds in lying.items() if seconds > _FLAT_S]
     if found:
+        most = config.task.terminate_after_s + config.training_aids.head_grace_s
         log(
             "warning: these curves lie flat, but a head that is on the floor for more than "
-            f"{config.terminate_after_s + config.head_grace_s:.1f} s ends the episode; begin "
+            f"{most:.1f} s ends the episode; begin "
             f"them later: {', '.join(found)}"
         )
 
@@ -123,13 +124,23 @@ def assemble(
         character=on_ground,
         observer=observer,
         config=config.task,
+        curriculum=Curriculum(
+            config=config.training_aids,
+            stand_start=config.task.stand_start,
+            control_dt=engine.control_dt,
+            most_lift=config.training_aids.assistive_wrench * on_ground.weight,
+            curve_match_rad=config.task.curve_match_rad,
+            terrain=config.terrain,
+        ),
         latent_size=latent_size,
         terrain=config.terrain,
-        symmetry=find_symmetry(config, character, observer, prior),
+        symmetry=find_symmetry(character, observer, prior),
     )
     place = Plane() if site is None else site.ground
     limp = LimpBodies(on_ground, place, config.task, config.seed, log).on_the_flat()
-    flat = FlatStarts(getups, character, config.task, config.seed, action_size, limp)
+    flat = FlatStarts(
+        getups, character, config.task, config.training_aids, config.seed, action_size, limp
+    )
     if site is None:
         terrain: Ground = Terrain.flat()
         pool = build_pool(flat, engine, log)
@@ -137,8 +148,6 @@ def assemble(
         terrain = jax.tree.map(jnp.asarray, site.ground.field())
         pool = build_region_pool(getups, flat, site, engine, config.task, log)
     points = jnp.asarray(np.stack([g.points for g in getups]), jnp.float32)
-    if site is not None and config.task.focus > 0:
-        pool = pool.replace(misfit=misfit.classes(pool, task.observer, terrain, points))
     log(f"start states: {len(pool.time)}")
     margin = config.task.target_margin_rad
     world = World(

@@ -18,12 +18,12 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from getup_jax.config import TaskConfig
+from getup_jax.config import CurriculumConfig
 from getup_jax.envs.getup.episode import LYING
 from getup_jax.motion.getup import curves
 from getup_jax.motion.getup.getups import FLAT_M
 
-# Rms of a moved control point's height (m), side and front angle (rad), times `task.curve_noise`.
+# Rms of a moved control point's height (m), side and front angle (rad), where the noise is 1.
 NOISE_RMS = (0.08, math.radians(10.0), math.radians(12.0))
 _SMOOTH = (1.0, 2.0, 1.0)  # weights of the draws that a point and its neighbours share
 _LEAST_SHARE = 0.5  # of the episode's own style in a blend
@@ -58,16 +58,21 @@ def style_curve(library: Library, getup: jax.Array) -> Curve:
 
 
 def draw_curves(
-    config: TaskConfig, library: Library, key: jax.Array, getup: jax.Array, kind: jax.Array
+    config: CurriculumConfig,
+    match_rad: float,
+    library: Library,
+    key: jax.Array,
+    getup: jax.Array,
+    kind: jax.Array,
 ) -> Curve:
     """Curves for episodes of the styles [B] that start in the kinds [B].
 
-    A share `task.drawn_share` of them is drawn, the others are the styles as they are.
+    A share `curriculum.drawn_curves` of them is drawn, the others are the styles as they are.
     """
     key_share, key_blend, key_noise, key_time = jax.random.split(key, 4)
     size = getup.shape[0]
     own = style_curve(library, getup)
-    blended = _blended(library, key_blend, getup, config.curve_match_rad)
+    blended = _blended(library, key_blend, getup, match_rad)
     moved = config.curve_noise * smooth_noise(key_noise, kind)
     points = _within(blended.points, blended.points + moved, covered_height(library))
     low, high = config.duration_range
@@ -75,7 +80,7 @@ def draw_curves(
     fastest = jnp.max(fastest_rise(library.points, library.duration)) / low
     slow_enough = duration * fastest_rise(points, duration) / fastest
     chance = jax.random.uniform(key_share, (size,))
-    drawn = chance < config.drawn_share
+    drawn = chance < config.drawn_curves
     return Curve(
         points=jnp.where(drawn[:, None, None], points, own.points),
         duration=jnp.where(drawn, jnp.maximum(duration, slow_enough), own.duration),

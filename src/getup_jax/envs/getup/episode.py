@@ -10,13 +10,11 @@ import jax.numpy as jnp
 from flax import struct
 
 from getup_jax.core.types import PhysicsState
-from getup_jax.envs.getup.curriculum.regions import Curriculum
+from getup_jax.envs.getup.curriculum.state import CurriculumState
 from getup_jax.runtime.pytree_store import from_nested
 
 # kinds of start, in the order of the pool's table
 LYING, STANDING, CLIP = 0, 1, 2
-
-SHARED = "focus", "assist", "curriculum"  # fields of EpisodeState that are of the whole batch
 
 STAND_LOWEST = 0.85  # of the curve's end, throughout the last second
 STAND_MEAN = 0.9  # of the curve's end, on average over the standing phase
@@ -65,26 +63,19 @@ class EpisodeState:
     key: jax.Array
     # [B] s, time on the curve at which a short episode is cut, inf: at its end; None: all are
     until: jax.Array | None = None
-    # [3 R, G, bins] success of the batch's starts; see start_prioritisation.py
-    focus: jax.Array | None = None
-    # [B] N, most lift of the helping hand; [3 R, G, bins] its levels; None: there is no hand
-    lift: jax.Array | None = None
-    assist: jax.Array | None = None
+    lift: jax.Array | None = None  # [B] N, most of the assistive wrench; None: there is none
     # Irregular ground only; None on a flat plane.
     region: jax.Array | None = None  # [B] int32, where the episode started
-    misfit: jax.Array | None = None  # [B] int32, of the start; see misfit.py
-    curriculum: Curriculum | None = None  # of the whole batch
-    # [B, F, L, 7] poses of the links, the oldest first; None: no discriminator looks at them
-    history: jax.Array | None = None
+    curriculum: CurriculumState | None = None  # of the whole batch
 
 
 def with_shared(state: EpisodeState, nested: Mapping[str, Any], where: str) -> EpisodeState:
-    """The state with the `SHARED` fields of another batch, nested arrays from the file `where`.
+    """The state with the curriculum of another batch, nested arrays from the file `where`.
 
     Raises CheckpointError where the other batch had another task.
     """
-    mine = {name: getattr(state, name) for name in SHARED}
-    return state.replace(**from_nested(mine, {name: nested.get(name) for name in SHARED}, where))
+    curriculum = nested.get("curriculum") or {}
+    return state.replace(curriculum=from_nested(state.curriculum, curriculum, where))
 
 
 def recorded(

@@ -10,6 +10,8 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
+TERMS = "height", "orientation", "velocity", "posture"  # of equation 4
+
 
 def height(value: jax.Array, target: jax.Array) -> jax.Array:
     """Equation 5: r_h = exp(-1.7 |h - p_h|)."""

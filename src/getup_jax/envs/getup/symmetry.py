@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from getup_jax.config import Config
 from getup_jax.core import mirror
 from getup_jax.core.mirror import AXIAL, POLAR, QUATERNION, SignedPermutation, Symmetry
 from getup_jax.envs.getup.observation import GRID_POINTS, Observer
@@ -14,15 +13,14 @@ from getup_jax.pose_prior.prior import PosePrior
 
 
 def find_symmetry(
-    config: Config, character: CharacterSpec, observer: Observer, prior: PosePrior | None
+    character: CharacterSpec, observer: Observer, prior: PosePrior | None
 ) -> Symmetry | None:
     """The symmetry of the get-up task; None where it has none.
 
-    It has none with a pose prior that is not mirrored, as the images of its latents mean nothing;
-    with discriminators, since their clips are not mirrored; and with a body that is not symmetric.
+    It has none with a pose prior that is not mirrored, as the images of its latents mean nothing,
+    and with a body that is not symmetric.
     """
-    styled = config.composite is not None and len(config.composite.groups) > 0
-    if styled or (prior is not None and not prior.mirrored) or not is_symmetric(character):
+    if (prior is not None and not prior.mirrored) or not is_symmetric(character):
         return None
     action = action_mirror(character, 0 if prior is None else prior.latent_size)
     return Symmetry(observation_mirror(observer, character, action), action)

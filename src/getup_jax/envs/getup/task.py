@@ -14,14 +14,11 @@ from getup_jax.core.mirror import Symmetry
 from getup_jax.core.quaternion import angle, conjugate, multiply
 from getup_jax.core.types import Engine, StepOutput, take
 from getup_jax.envs.getup import rewards, terminations
-from getup_jax.envs.getup.action_decoder import Units
-from getup_jax.envs.getup.curriculum import (
-    assistive_wrench,
-    regions,
-    sampler_update,
-    start_prioritisation,
-)
-from getup_jax.envs.getup.curriculum.start_sampler import Draw, draw_starts, with_curves
+from getup_jax.envs.getup.action_decoder import ActionDecoder
+from getup_jax.envs.getup.curriculum import assistive_wrench, regions
+from getup_jax.envs.getup.curriculum.curriculum import Curriculum, is_alone, runs_to_the_end
+from getup_jax.envs.getup.curriculum.start_sampler import Draw
+from getup_jax.envs.getup.curriculum.state import CurriculumState
 from getup_jax.envs.getup.drawn_curves import Curve, style_curve
 from getup_jax.envs.getup.episode import EpisodeState, Record, recorded, verdict
 from getup_jax.envs.getup.observation import Observer, Posture
@@ -56,6 +53,7 @@ class GetUpTask:
     character: CharacterSpec
     observer: Observer
     config: TaskConfig
+    curriculum: Curriculum
     latent_size: int  # 0 without a pose prior
     terrain: TerrainConfig | None = None  # None: a flat plane
     symmetry: Symmetry | None = None  # of observations and actions; None: there is none
@@ -72,9 +70,16 @@ class GetUpTask:
 
     @property
     def objective_weights(self) -> dict[str, float]:
-        """Objectives and their weights: all terms multiplied, and tracking alone where it is on."""
-        track = self.config.track_weight
-        return {"total": 1.0} | ({"track": track} if track > 0 else {})
+        """Objectives and their weights: all terms multiplied, or each of them, and tracking."""
+        config = self.curriculum.config
+        names = ("total",) if config.objectives == "product" else self._term_names
+        track = {"track": config.track_weight} if config.track_weight > 0 else {}
+        return dict.fromkeys(names, 1.0) | track
+
+    @property
+    def _term_names(self) -> tuple[str, ...]:
+        """Without a pose prior there is nothing that offsets could be unnatural to [P 6.4]."""
+        return rewards.TERMS if self.latent_size == 0 else (*rewards.TERMS, "natural")
 
     @property
     def action_size(self) -> int:
@@ -84,15 +89,10 @@ class GetUpTask:
     def init(self, world: World, key: jax.Array, num_envs: int) -> EpisodeState:
         """B fresh episodes."""
         key_start, key_state = jax.random.split(key)
-        learned = start_prioritisation.first(world.pool) if self.config.focus > 0 else None
-        levels = None
-        if learned is not None and self.config.assist > 0:
-            levels = jnp.ones_like(learned)
-        progress = None if self.terrain is None else regions.first(self.terrain)
-        drawn = draw_starts(self.config, world, key_start, num_envs, learned, progress, levels)
-        drawn = with_curves(self.config, world, key_start, drawn)
-        state = self._begin(world, drawn, levels)
-        return state.replace(key=key_state, focus=learned, assist=levels, curriculum=progress)
+        learned = self.curriculum.first(world.pool)
+        drawn = self.curriculum.draw(world, learned, key_start, num_envs)
+        drawn = self.curriculum.with_curves(world, key_start, drawn)
+        return self._begin(world, drawn, learned).replace(key=key_state, curriculum=learned)
 
     def stagger(self, state: EpisodeState, key: jax.Array) -> EpisodeState:
         """Episodes [B] that are cut at any time; what comes after them runs to its end."""
@@ -107,39 +107,29 @@ class GetUpTask:
         """One control step; episodes that end start anew."""
         after, output = self.advance(world, state, action)
         key_next, key_reset = jax.random.split(state.key)
-        learned, levels = sampler_update.learned(
-            self.config, world.pool, after, output, self.engine.control_dt
-        )
-        progress, output = sampler_update.progress(self.terrain, after, output)
-        size = action.shape[0]
-        drawn = draw_starts(self.config, world, key_reset, size, learned, progress, levels)
+        before = state.curriculum or CurriculumState()
+        learned, output = self.curriculum.update(world.pool, before, after, output)
+        drawn = self.curriculum.draw(world, learned, key_reset, action.shape[0])
 
         def fresh(index: jax.Array) -> EpisodeState:
             picked = jax.tree.map(lambda x: x[index], drawn)
-            picked = with_curves(self.config, world, key_reset, picked, index[0])
-            begun = self._begin(world, picked, levels).replace(key=None)
+            picked = self.curriculum.with_curves(world, key_reset, picked, index[0])
+            begun = self._begin(world, picked, learned).replace(key=None)
             if state.until is None or begun.until is not None:
                 return begun  # episodes are cut short, or none is
             return begun.replace(until=jnp.full_like(begun.time, jnp.inf))  # only first ones are
 
         done = output.done
         # what belongs to the whole batch has no simulation axis and stays out of the rows
-        rows = after.replace(key=None, focus=None, assist=None, curriculum=None)
-        after = replace_rows(rows, done, fresh, _RESET_CHUNK)
-        after = after.replace(key=key_next, focus=learned, assist=levels, curriculum=progress)
+        after = replace_rows(after.replace(key=None, curriculum=None), done, fresh, _RESET_CHUNK)
+        after = after.replace(key=key_next, curriculum=learned)
         return after, output.replace(observation=after.observation)
 
-    def _begin(self, world: World, drawn: Draw, levels: jax.Array | None) -> EpisodeState:
+    def _begin(self, world: World, drawn: Draw, learned: CurriculumState) -> EpisodeState:
         state = self.start(
             world, drawn.getup, drawn.kind, drawn.row, curve=drawn.curve, region=drawn.region
         )
-        if drawn.lasts is not None:
-            state = state.replace(until=state.time + drawn.lasts)
-        if drawn.helped is None or levels is None:
-            return state
-        cell = sampler_update.first_cell(world.pool, state, self.engine.control_dt)
-        most = self.config.assist * self.character.weight * levels[cell]
-        return state.replace(lift=jnp.where(drawn.helped, most, 0.0))
+        return self.curriculum.prepared(world.pool, learned, drawn, state)
 
     def start(
         self,
@@ -174,12 +164,11 @@ class GetUpTask:
             record=Record.empty(size),
             key=jnp.zeros(2, jnp.uint32),
             region=self._region_of(region, getup),
-            misfit=None if world.pool.misfit is None else world.pool.misfit[index],
         )
         # The filter keeps most of the last action, so the first target must be the start pose.
         angles, condition = physics.kinematics.qpos[:, 7:], self.targets(state)[:, 0]
         flat = self.terrain is None
-        hold = self.units(world).first(self.config, flat, angles, condition)
+        hold = self.decoder(world).first(self.config, flat, angles, condition)
         if world.pool.action is not None:
             given = world.pool.action[index]
             hold = jnp.where(jnp.isnan(given), hold, given)
@@ -192,7 +181,7 @@ class GetUpTask:
         """One control step without resets; `observation` is the final one."""
         filtered = self.config.filter * action + (1.0 - self.config.filter) * state.action
         target = self.servo_target(world, state, filtered)
-        physics = self.engine.step(state.physics, target, wrench=self._hand(world, state))
+        physics = self.engine.step(state.physics, target, wrench=self._wrench(world, state))
         state = state.replace(
             physics=physics, action=filtered, time=state.time + self.engine.control_dt
         )
@@ -204,10 +193,13 @@ class GetUpTask:
         control_dt = self.engine.control_dt
         gap = terminations.head_gap(self.character, world.terrain, physics.kinematics)
         head = gap < self.config.head_clearance_m
-        state, causes = terminations.counted(self.config, control_dt, state, terms["task"], head)
+        grace_s = self.curriculum.config.head_grace_s
+        state, causes = terminations.counted(
+            self.config, control_dt, state, terms["task"], head, grace_s
+        )
         causes["not_finite"] = ~finite
         for name in self.objective_weights:
-            terms[name] = terminations.paid(self.config, control_dt, state, terms[name])
+            terms[name] = terminations.paid(self.config, control_dt, state, terms[name], grace_s)
         terminated = causes["low_reward"] | causes["head"] | causes["not_finite"]
         half_step = 0.5 * control_dt
         end = state.duration + self.config.stand_time_s - half_step
@@ -234,35 +226,33 @@ class GetUpTask:
     def _verdict(self, state: EpisodeState, truncated: jax.Array) -> dict[str, jax.Array]:
         episode = verdict(state, truncated, self._full_steps(state))
         if state.until is not None or state.lift is not None:
-            whole = sampler_update.runs_to_the_end(state) & sampler_update.is_alone(state)
+            whole = runs_to_the_end(state) & is_alone(state)
             episode = {name: jnp.where(whole, x, jnp.nan) for name, x in episode.items()}
         if state.region is None:
             return episode
         return episode | regions.by_region(episode, state.region)
 
-    def _hand(self, world: World, state: EpisodeState) -> jax.Array | None:
-        """Wrench [B, 6] of the helping hand; None: there is none."""
+    def _wrench(self, world: World, state: EpisodeState) -> jax.Array | None:
+        """The assistive wrench [B, 6]; None: there is none."""
         if state.lift is None:
             return None
         measured = state.observation[:, self.observer.slices()["features"]]
         target = self.targets(state)[:, 0]
         kinematics = state.physics.kinematics
         normal = world.terrain.normal(kinematics.qpos[:, :2])
-        held = state.record.steps * self.engine.control_dt < self.config.assist_s
-        most = jnp.where(held, state.lift, 0.0)
         return assistive_wrench.wrench(
-            self.observer.links, kinematics, measured, target, normal, most
+            self.observer.links, kinematics, measured, target, normal, state.lift
         )
 
     def servo_target(self, world: World, state: EpisodeState, filtered: jax.Array) -> jax.Array:
         """Hinge targets [B, J]: q = decoder(z, c) + dq [P 3.4], c the curve values now."""
-        target = self.units(world).target(filtered, self.targets(state)[:, 0])
+        target = self.decoder(world).target(filtered, self.targets(state)[:, 0])
         return jnp.clip(target, world.target_lower, world.target_upper)
 
-    def units(self, world: World) -> Units:
+    def decoder(self, world: World) -> ActionDecoder:
         """What the actions mean."""
         neutral = jnp.asarray(self.character.neutral_qpos[7:], jnp.float32)
-        return Units(world.prior, self.config.offset_scale, neutral)
+        return ActionDecoder(world.prior, self.config.offset_scale, neutral)
 
     def _region_of(self, region: jax.Array | None, getup: jax.Array) -> jax.Array | None:
         """The state's region [B]: None on a flat plane, the first one where none is given."""
@@ -285,14 +275,14 @@ class GetUpTask:
     def _reward_terms(
         self, world: World, state: EpisodeState, posture: Posture, target: jax.Array
     ) -> dict[str, jax.Array]:
-        config = self.config
+        config, curriculum = self.config, self.curriculum.config
         omega = posture.link_angular_velocity.reshape(len(target), -1)
         joint_error = angle(multiply(conjugate(world.neutral_rotation), posture.joint_rotation))
         end = state.points[:, -1, 0]
         terms = rewards.terms(posture.features, target, end, omega, joint_error)
-        terms["total"] = rewards.sharpened(terms, config.sharpness)
-        if config.track_weight > 0:
-            terms["track"] = rewards.tracking(terms, config.track_sharpness)
+        terms["total"] = rewards.sharpened(terms, curriculum.reward_sharpness)
+        if curriculum.track_weight > 0:
+            terms["track"] = rewards.tracking(terms, curriculum.track_sharpness)
         if world.prior is None:  # nothing that offsets could be unnatural to [P 6.4]
             return terms
         offset = config.offset_scale * state.action[:, self.latent_size :]

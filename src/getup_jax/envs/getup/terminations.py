@@ -28,29 +28,31 @@ def counted(
     state: EpisodeState,
     task_reward: jax.Array,
     head: jax.Array,
+    grace_s: float = 0.0,
 ) -> tuple[EpisodeState, dict[str, jax.Array]]:
     """The state with one more step of each, and which [B] were held for too long.
 
-    task_reward [B]: of this step. head [B]: whether it is on the floor.
+    task_reward [B]: of this step. head [B]: whether it is on the floor. grace_s: for so long that
+    only costs the reward, see `paid`.
     """
     low = task_reward < config.terminate_reward
     state = state.replace(
         low_steps=jnp.where(low, state.low_steps + 1, 0),
         head_steps=jnp.where(head, state.head_steps + 1, 0),
     )
-    most, grace = config.terminate_after_s, config.head_grace_s
+    most = config.terminate_after_s
     causes = {
         "low_reward": state.low_steps > _steps(most, control_dt),
-        "head": state.head_steps > _steps(most + grace, control_dt),
+        "head": state.head_steps > _steps(most + grace_s, control_dt),
     }
     return state, causes
 
 
 def paid(
-    config: TaskConfig, control_dt: float, state: EpisodeState, reward: jax.Array
+    config: TaskConfig, control_dt: float, state: EpisodeState, reward: jax.Array, grace_s: float
 ) -> jax.Array:
     """The reward [B]; 0 in a grace time, in which an episode would be over without it."""
-    if config.head_grace_s == 0:
+    if grace_s == 0:
         return reward
     in_time = state.head_steps <= _steps(config.terminate_after_s, control_dt)
     return jnp.where(in_time, reward, 0.0)

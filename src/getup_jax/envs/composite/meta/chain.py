@@ -20,7 +20,7 @@ from getup_jax.envs.composite.build import (
 from getup_jax.envs.composite.goals.combine import make_goals
 from getup_jax.envs.composite.groups import resolve_groups
 from getup_jax.envs.composite.meta.meta_policy import Level, LevelArrays, MetaTask, MetaWorld
-from getup_jax.envs.composite.meta.observation_substitution import Familiar, make_familiar
+from getup_jax.envs.composite.meta.observation_substitution import Substitution, make_substitution
 from getup_jax.envs.composite.task import CompositeTask
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.rl.actor_critic import make_actor_critic
@@ -48,18 +48,18 @@ def with_meta(config: Config, built: BuiltComposite) -> tuple[MetaTask, MetaWorl
         arrays.append(LevelArrays(policy, ratio, shift, _sees(loaded.config, user, task)))
     links = _differ(_composite(chain[-1].config), task.config, task.character)
     new = tuple(links[task.character.joint_link].tolist())
-    env = MetaTask(task, tuple(levels), new=new, first_share=task.config.meta_share)
+    env = MetaTask(task, tuple(levels), new=new)
     return env, MetaWorld(built.world, tuple(arrays))
 
 
-def _sees(own: Config, user: Config, task: CompositeTask) -> Familiar | None:
+def _sees(own: Config, user: Config, task: CompositeTask) -> Substitution | None:
     """How a policy sees the links that the one which uses it has taken from it."""
     if _composite(user).meta_sees != "own":
         return None
     composite, character = _composite(own), task.character
     clips = load_clips(composite, character)
     starts, _ = start_states(composite, character, clips, task.engine, own.task.pool_size)
-    return make_familiar(starts.history, _differ(composite, _composite(user), character))
+    return make_substitution(starts.history, _differ(composite, _composite(user), character))
 
 
 def _differ(one: CompositeConfig, two: CompositeConfig, character: CharacterSpec) -> np.ndarray:

@@ -16,8 +16,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from getup_jax.core.types import Kinematics, StepOutput
-from getup_jax.envs.composite.meta import residual_blending
-from getup_jax.envs.composite.meta.observation_substitution import Familiar, familiar
+from getup_jax.envs.composite.meta.observation_substitution import Substitution, substitute
 from getup_jax.envs.composite.reference_windows import References
 from getup_jax.envs.composite.task import CompositeState, CompositeTask, CompositeWorld
 from getup_jax.networks import gaussian
@@ -41,7 +40,7 @@ class LevelArrays:
     policy: PolicyState
     scale: jax.Array  # [A] its action 1 in units of the next level's
     shift: jax.Array  # [A] its action 0 in them
-    sees: Familiar | None = None  # how it sees the links that it has lost; None: as they are
+    sees: Substitution | None = None  # how it sees the links that it has lost; None: as they are
 
 
 @struct.dataclass
@@ -64,7 +63,6 @@ class MetaState:
     task: CompositeState
     observation: jax.Array  # [B, O + A]
     key: jax.Array
-    share: Any = None  # [] of the meta policy in new hinges; None: always 0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -75,7 +73,6 @@ class MetaTask:
     levels: tuple[Level, ...]
     sample: bool = True  # meta actions are drawn; False: their means
     new: tuple[bool, ...] = ()  # [A] hinges whose clips the last meta policy was not trained on
-    first_share: float = 0.0  # of the meta policy in them; falls while training
 
     @property
     def frames(self) -> tuple[int, int]:
@@ -106,7 +103,7 @@ class MetaTask:
         """B fresh episodes."""
         key_task, key_meta, key_next = jax.random.split(key, 3)
         task = self.task.init(world.task, key_task, num_envs)
-        return self._begin(task, self._join(world, task, key_meta), key_next)
+        return MetaState(task, self._join(world, task, key_meta), key_next)
 
     def stagger(self, state: MetaState, key: jax.Array) -> MetaState:
         """Fresh episodes that end at different times."""
@@ -116,20 +113,12 @@ class MetaTask:
         self, world: MetaWorld, state: MetaState, action: jax.Array
     ) -> tuple[MetaState, StepOutput]:
         """One control step; episodes that end start anew."""
-        action = self._blended(state, action)
-        after, output = self._after(world, state, *self.task.step(world.task, state.task, action))
-        if state.share is None:
-            return after, output
-        fell, step_s = output.metrics["ended_fall"], self.task.engine.control_dt
-        share = residual_blending.followed(state.share, fell, step_s, self.first_share)
-        metrics = output.metrics | {"meta_share": jnp.broadcast_to(share, fell.shape)}
-        return after.replace(share=share), output.replace(metrics=metrics)
+        return self._after(world, state, *self.task.step(world.task, state.task, action))
 
     def advance(
         self, world: MetaWorld, state: MetaState, action: jax.Array
     ) -> tuple[MetaState, StepOutput]:
         """One control step without resets."""
-        action = self._blended(state, action)
         return self._after(world, state, *self.task.advance(world.task, state.task, action))
 
     def kinematics(self, state: MetaState) -> Kinematics:
@@ -141,7 +130,7 @@ class MetaTask:
     ) -> MetaState:
         """See `CompositeTask.adopt`."""
         task = self.task.adopt(world.task, state, goals, key)
-        return self._begin(task, self._join(world, task, key), key)
+        return MetaState(task, self._join(world, task, key), key)
 
     def task_state(self, state: MetaState) -> CompositeState:
         """The episode as a task without a meta policy has it."""
@@ -155,20 +144,6 @@ class MetaTask:
         """See `CompositeTask.success`."""
         return self.task.success(state.task)
 
-    def handed_over(self, state: MetaState, left: float) -> MetaState:
-        """The episodes with only a part `left` of the meta policy's share."""
-        return state if state.share is None else state.replace(share=left * state.share)
-
-    def _begin(self, task: CompositeState, observation: jax.Array, key: jax.Array) -> MetaState:
-        share = jnp.asarray(self.first_share, jnp.float32) if self.first_share else None
-        return MetaState(task, observation, key, share)
-
-    def _blended(self, state: MetaState, action: jax.Array) -> jax.Array:
-        if state.share is None:
-            return action
-        meta = state.observation[:, -self.meta_size :]
-        return residual_blending.blended(state.share, jnp.asarray(self.new), action, meta)
-
     def _after(
         self, world: MetaWorld, state: MetaState, task: CompositeState, output: StepOutput
     ) -> tuple[MetaState, StepOutput]:
@@ -178,7 +153,7 @@ class MetaTask:
         none = jnp.zeros_like(joined[:, self.task.observation_size :])
         final = jnp.concatenate([output.final_observation, none], axis=-1)
         output = output.replace(observation=joined, final_observation=final)
-        return MetaState(task, joined, key_next, state.share), output
+        return MetaState(task, joined, key_next), output
 
     def _join(self, world: MetaWorld, task: CompositeState, key: jax.Array) -> jax.Array:
         action = self.meta_action(world, self._observations(world, task), key)
@@ -190,7 +165,7 @@ class MetaTask:
         observation = task.observation
         for arrays in reversed(world.levels):
             if arrays.sees is not None:
-                history = familiar(arrays.sees, history)
+                history = substitute(arrays.sees, history)
                 observation = self.task.observe(history, task.goals, task.physics)
             found.append(observation)
         return found[::-1]

@@ -18,23 +18,23 @@ from getup_jax.envs.composite.link_frames import LINK_STATE
 
 
 @struct.dataclass
-class Familiar:
+class Substitution:
     """What a policy knows."""
 
     moments: jax.Array  # [P, FRAMES + 1, L, LINK_STATE] relative to the root, see `_relative`
     new: jax.Array  # [L] bool, links that it does not know as they are now
 
 
-def make_familiar(history: jax.Array, new: np.ndarray) -> Familiar:
+def make_substitution(history: jax.Array, new: np.ndarray) -> Substitution:
     """From the frames [P, FRAMES + 1, L, LINK_STATE] before its own starts (world frame)."""
     flat = np.unique(np.asarray(history).reshape(len(history), -1), axis=0)
     different = jnp.asarray(flat.reshape(-1, *history.shape[1:]))
     own = np.array(new)
     own[0] = False  # the root is where it is
-    return Familiar(jax.jit(_relative)(different), jnp.asarray(own))
+    return Substitution(jax.jit(_relative)(different), jnp.asarray(own))
 
 
-def familiar(known: Familiar, history: jax.Array) -> jax.Array:
+def substitute(known: Substitution, history: jax.Array) -> jax.Array:
     """The history [B, FRAMES + 1, L, LINK_STATE] (world frame) as the policy sees it.
 
     The moment is that with the least sum of squared distances (m) of the links that it knows, in
@@ -56,7 +56,7 @@ def familiar(known: Familiar, history: jax.Array) -> jax.Array:
     return jnp.where(known.new[:, None], shown, history)
 
 
-def _distances(known: Familiar, relative: jax.Array) -> jax.Array:
+def _distances(known: Substitution, relative: jax.Array) -> jax.Array:
     """Squared distances [B, P] between histories and moments: |a|^2 - 2 a b + |b|^2."""
 
     def features(x: jax.Array) -> jax.Array:

@@ -1,14 +1,14 @@
-"""A helping hand on the pelvis while training, which lets go where starts succeed with it.
+"""An assistive wrench on the pelvis while training, which fades where starts succeed with it.
 
 It lifts like a rope while the neck is below the curve, and turns the pelvis towards the curve's
 torso angles, so that it needs no more than the curve. On a slope it also turns a body that lies or
 sits with its legs up the slope, until they are across it: as it lies it hardly ever gets up. What
-it may give at most is a share of the full hand, its level; every cell of `start_prioritisation.py`
-has its own. A level falls with each success of an episode that started there with the hand, and
-rises with each failure, so that a third of them (at the default rates) succeed until the hand is
-gone (compare Yu et al. 2018, Learning symmetric and low-energy locomotion). Starts with the hand
-are drawn at a frontier of their own, that of 1 - level: with it a whole rise is learned before its
-parts are without. Evaluation has no hand.
+it may give at most is a share of the full wrench, its level; every cell of
+`start_prioritisation.py` has its own. A level falls with each success of an episode that started
+there with the wrench, and rises with each failure, so that a third of them succeed until it is gone
+(compare Yu et al. 2018, Learning symmetric and low-energy locomotion). Starts with it are drawn at
+a frontier of their own, that of 1 - level: with it a whole rise is learned before its parts are
+without. An evaluation has none.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ _TURN_NM_PER_N = 0.25  # m, the most turn for the most lift
 _ACROSS_RAD = 1.2  # between the legs and down the slope, up to which their direction is left alone
 _STEEP = 0.2  # sine of the slope from which on they are turned at full strength
 _UP_M = 0.8, 0.6  # heights of the neck at which that begins and is at its most
+_SUCCESS, _FAILURE = 0.02, 0.01  # by which they lower and raise a level
 _DAMPING_S = 0.05  # rad of error that an angular velocity of 1 rad/s counts as
 
 
@@ -85,12 +86,7 @@ def update(
     cell: tuple[jax.Array, ...],
     ended: jax.Array,
     success: jax.Array,
-    rates: tuple[float, float],
 ) -> jax.Array:
-    """The levels after episodes [B] with the hand that ended; cell holds their indices [B].
-
-    rates: by how much a success lowers a level, and a failure raises it.
-    """
-    fall, rise = rates
-    change = jnp.where(success, -fall, rise) * ended
+    """The levels after episodes [B] with the wrench that ended; cell holds their indices [B]."""
+    change = jnp.where(success, -_SUCCESS, _FAILURE) * ended
     return jnp.clip(level.at[cell].add(change), 0.0, 1.0)

@@ -18,8 +18,8 @@ _RATE = 0.01  # share of an episode's result in its region's running success
 
 
 @struct.dataclass
-class Curriculum:
-    """How far training has come."""
+class RegionProgress:
+    """Which regions are open, and how training goes in them."""
 
     opened: jax.Array  # [] int32 regions that are open, the first ones of REGIONS
     successes: jax.Array  # [] int32 in the newest of them, since it opened
@@ -27,21 +27,21 @@ class Curriculum:
     rate: jax.Array  # [R] running success of the episodes that began lying in each region
 
 
-def first(config: TerrainConfig) -> Curriculum:
+def first(config: TerrainConfig) -> RegionProgress:
     """Before training: the flat region is open, or all where there is no curriculum."""
     opened = len(REGIONS) if config.curriculum == "none" else 1
     zero = jnp.zeros((), jnp.int32)
     rate = jnp.zeros(len(REGIONS), jnp.float32)
-    return Curriculum(jnp.asarray(opened, jnp.int32), successes=zero, steps=zero, rate=rate)
+    return RegionProgress(jnp.asarray(opened, jnp.int32), successes=zero, steps=zero, rate=rate)
 
 
 def advance(
-    state: Curriculum,
+    state: RegionProgress,
     config: TerrainConfig,
     ended: jax.Array,
     success: jax.Array,
     region: jax.Array,
-) -> Curriculum:
+) -> RegionProgress:
     """After one step of B simulations.
 
     ended [B]: an episode that began lying in region [B] (int32) ended in this step; success [B]:
@@ -62,10 +62,10 @@ def advance(
         opened = state.opened
     successes = jnp.where(opened > state.opened, 0, successes)
     rate = success_rate.update(state.rate, (region,), ended, success, _RATE)
-    return Curriculum(opened=opened, successes=successes, steps=steps, rate=rate)
+    return RegionProgress(opened=opened, successes=successes, steps=steps, rate=rate)
 
 
-def draw_region(state: Curriculum, key: jax.Array, count: int, share: float) -> jax.Array:
+def draw_region(state: RegionProgress, key: jax.Array, count: int, share: float) -> jax.Array:
     """Regions [count] int32 of new episodes: the open ones, in proportion to 1 - share * success.
 
     With a share of 0 all as often. A solved episode is several times as long as one that fails, so

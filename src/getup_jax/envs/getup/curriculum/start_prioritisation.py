@@ -2,10 +2,10 @@
 
 Success is followed in cells: place x style x part of the curve at which it starts, where a place is
 a kind of start in a region (the kind alone on a flat plane). Lying starts are all in the first
-part, and have the class of `misfit.py` in its stead. At the frontier a start sometimes succeeds, or
+part. At the frontier a start sometimes succeeds, or
 it fails and the next part of the curve is solved (reverse curriculum, Florensa et al. 2017). A
 solved episode is several times as long as one that fails, so that with even draws most samples
-would come from what needs no more practice.
+would come from what is learned already.
 """
 
 from __future__ import annotations
@@ -36,20 +36,15 @@ def bin_of(begin: jax.Array) -> jax.Array:
     return jnp.clip(jnp.floor(begin * BINS + 1e-3), 0, BINS - 1).astype(jnp.int32)
 
 
-def part_of(begin: jax.Array, misfit: jax.Array | None) -> jax.Array:
-    """Last index [...] int32 of the cells of starts: lying ones, at 0, have their misfit there."""
-    return bin_of(begin) if misfit is None else bin_of(begin) + misfit
-
-
 def weights(
     learned: jax.Array,
     pool: Pool,
     duration: jax.Array,
-    focus: float,
+    strength: float,
     even: bool = False,
     everywhere: bool = False,
 ) -> jax.Array:
-    """Weight [3 R, G, M] of every entry of the pool's table: 1 - focus + focus * frontier.
+    """Weight [3 R, G, M] of every entry of the pool's table: 1 - strength + strength * frontier.
 
     Zero for the styles that cannot start in a region. With `even`, a style's weights are scaled to
     the sum of their largest one: else a style of which much succeeds at times is drawn ten times
@@ -57,13 +52,12 @@ def weights(
     curve.
     """
     table = pool.table.reshape(-1, *pool.table.shape[2:])
-    misfit = None if pool.misfit is None else pool.misfit[table]
-    part = part_of(pool.time[table] / duration[:, None], misfit)
+    part = bin_of(pool.time[table] / duration[:, None])
     places, styles, _ = part.shape
     cell = (jnp.arange(places)[:, None, None], jnp.arange(styles)[None, :, None], part)
     used = jnp.zeros(learned.shape, bool).at[cell].set(True)
     near = frontier(learned, used, pool.table.shape[1], everywhere)
-    weight = 1.0 - focus + focus * jnp.take_along_axis(near, part, axis=-1)
+    weight = 1.0 - strength + strength * jnp.take_along_axis(near, part, axis=-1)
     if even:
         scale = jnp.max(weight, axis=-1) / jnp.sum(weight, axis=-1)
         weight = weight * scale[..., None]

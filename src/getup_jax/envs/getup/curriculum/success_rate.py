@@ -1,4 +1,4 @@
-"""Running success of what episodes are counted by: cells of the focus, regions of the ground."""
+"""Running success of what episodes are counted by: cells of start prioritisation, regions of the ground."""
 
 from __future__ import annotations
 

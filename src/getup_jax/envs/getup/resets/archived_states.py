@@ -84,7 +84,8 @@ def load_paths(
     place = asset_path("paths") if folder == SHIPPED else Path(folder)
     if not place.is_dir():
         raise ConfigError(
-            f"task.paths: no folder {folder}; make it with `getup-search CONFIG --out {folder}`"
+            f"curriculum.archive: no folder {folder}; make it with "
+            f"`getup-search CONFIG --out {folder}`"
         )
     found = []
     for getup in getups:

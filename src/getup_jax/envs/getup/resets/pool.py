@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from flax import struct
 
-from getup_jax.config import ConfigError, TaskConfig
+from getup_jax.config import ConfigError, CurriculumConfig, TaskConfig
 from getup_jax.core.types import Engine, PhysicsState
 from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
 from getup_jax.envs.getup.references import Reference, make_references, velocities
@@ -64,7 +64,6 @@ class Pool:
     table: jax.Array  # [3, R, G, M] int32 rows of every kind of start, region and style
     action: jax.Array | None = None  # [P, A] filtered, NaN: the pose's own; None: all are
     startable: Startable | None = None  # None, a flat plane: every style can start everywhere
-    misfit: jax.Array | None = None  # [P] int32, see misfit.py; None: nobody asks
 
 
 def build_pool(flat: FlatStarts, engine: Engine, log: Log) -> Pool:
@@ -72,7 +71,7 @@ def build_pool(flat: FlatStarts, engine: Engine, log: Log) -> Pool:
 
     A kind with no share still gets one row a style, so that the table has one form.
     """
-    kinds = sum(share > 0 for share in kind_shares(flat.config))
+    kinds = sum(share > 0 for share in kind_shares(flat.config, flat.curriculum))
     rows = max(1, flat.config.pool_size // max(1, len(flat.getups) * kinds))
     starts, table = flat.make(rows)
     flat.lay_down(starts, table[LYING], flat.character, log)
@@ -99,6 +98,7 @@ class FlatStarts:
     getups: Sequence[GetUp]
     character: CharacterSpec
     config: TaskConfig
+    curriculum: CurriculumConfig
     seed: int
     action_size: int
     limp: Starts | None = None  # limp bodies on flat ground; None: no lying start is one
@@ -108,7 +108,7 @@ class FlatStarts:
 
         Lying starts hang just above the ground, see `lay_down`.
         """
-        counts = [rows if share > 0 else 1 for share in kind_shares(self.config)]
+        counts = [rows if share > 0 else 1 for share in kind_shares(self.config, self.curriculum)]
         make = self._maker()
         parts, table, offset = [], np.zeros((3, len(self.getups), rows), np.int32), 0
         for kind, count in enumerate(counts):
@@ -158,11 +158,11 @@ class FlatStarts:
         getups, character, config = self.getups, self.character, self.config
         references: Sequence[Reference | None] = [None] * len(getups)
         paths: Sequence[FoundPath | None] = [None] * len(getups)
-        if config.clip_start > 0:
+        if self.curriculum.reference_start > 0:
             references = make_references(getups, character)
-            if config.paths is not None:
+            if self.curriculum.archive is not None:
                 size = character.num_joints, self.action_size
-                paths = load_paths(config.paths, getups, *size)
+                paths = load_paths(self.curriculum.archive, getups, *size)
         return _StartMaker(
             getups=getups,
             character=character,
@@ -170,14 +170,15 @@ class FlatStarts:
             rng=np.random.default_rng(self.seed),
             references=references,
             paths=paths,
+            path_share=self.curriculum.archive_share,
             action_size=self.action_size,
         )
 
 
-def kind_shares(config: TaskConfig) -> tuple[float, float, float]:
+def kind_shares(config: TaskConfig, curriculum: CurriculumConfig) -> tuple[float, float, float]:
     """Shares of the kinds LYING, STANDING and CLIP, in this order; they sum to 1."""
-    lying = 1.0 - config.stand_start - config.clip_start
-    return lying, config.stand_start, config.clip_start
+    lying = 1.0 - config.stand_start - curriculum.reference_start
+    return lying, config.stand_start, curriculum.reference_start
 
 
 @dataclasses.dataclass(frozen=True)
@@ -190,6 +191,7 @@ class _StartMaker:
     rng: np.random.Generator
     references: Sequence[Reference | None]  # [G]
     paths: Sequence[FoundPath | None]  # [G]
+    path_share: float  # of the starts along the motion that a path's state replaces
     action_size: int
 
     def start(self, kind: int, style: int, count: int) -> FreeStarts:
@@ -216,7 +218,7 @@ class _StartMaker:
             return starts
         for row, time in enumerate(starts.time):
             near = path.near(time, _NEAR_S)
-            if len(near) and self.rng.random() < self.config.path_share:
+            if len(near) and self.rng.random() < self.path_share:
                 chosen = self.rng.choice(near)
                 for field in dataclasses.fields(starts):
                     getattr(starts, field.name)[row] = getattr(path, field.name)[chosen]

@@ -27,7 +27,7 @@ from getup_jax.envs.getup.resets.pool import (
 )
 from getup_jax.envs.getup.resets.standing import stand
 from getup_jax.envs.getup.resets.style_matching import fits, least_used
-from getup_jax.envs.getup.resets.terrain_projection import set_down
+from getup_jax.envs.getup.resets.terrain_projection import project_to_ground
 from getup_jax.motion.clips import GetUp
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap
@@ -58,11 +58,11 @@ def build_region_pool(
 
     The flat region has those of the flat plane at random places. In the others a style starts
     from rag-dolls that fell so that their torso angles fit it, or standing, and along its clip if
-    `clip_everywhere`; one that no rag-doll fits is left out of the region.
+    `curriculum.reference_everywhere`; one that no rag-doll fits is left out of the region.
     """
     irregular = _irregular_starts(site, config, log)
     fair = fits(getups, irregular[LYING].qpos, site.character, config.curve_match_rad)
-    rows, rng = _rows(config, len(getups)), np.random.default_rng(flat.seed)
+    rows, rng = _rows(flat, len(getups)), np.random.default_rng(flat.seed)
     table = np.zeros((3, len(REGIONS), len(getups), rows), np.int32)
     parts = [_on_the_flat(flat, site, table, rng, log)]
     startable = np.ones((len(REGIONS), len(getups)), bool)
@@ -81,7 +81,7 @@ def build_region_pool(
                 none = np.full((rows, flat.action_size), np.nan)
                 starts = irregular[kind].take(index)
                 parts.append(FreeStarts(starts.qpos, starts.qvel, time, none))
-        if config.clip_everywhere:
+        if flat.curriculum.reference_everywhere:
             size = sum(len(p) for p in parts)
             table[CLIP, region] = size + np.arange(len(getups) * rows).reshape(-1, rows)
             parts.append(_along(parts[0], table[CLIP, 0].ravel(), region, site, rng))
@@ -96,7 +96,7 @@ def _along(
     flat: FreeStarts, index: np.ndarray, region: int, site: Site, rng: np.random.Generator
 ) -> FreeStarts:
     """The flat region's starts of the given rows, set down at random places of another region."""
-    qpos, qvel = set_down(
+    qpos, qvel = project_to_ground(
         site.character,
         site.ground.field(),
         flat.qpos[index],
@@ -139,10 +139,10 @@ def region_starts(pool: Pool, episodes: int) -> tuple[np.ndarray, np.ndarray, np
     return style.astype(np.int32), row.astype(np.int32), region.astype(np.int32)
 
 
-def _rows(config: TaskConfig, styles: int) -> int:
+def _rows(flat: FlatStarts, styles: int) -> int:
     """M, the rows of every kind, region and style."""
-    kinds = sum(share > 0 for share in kind_shares(config))
-    return -(-config.pool_size // (styles * kinds * len(REGIONS)))
+    kinds = sum(share > 0 for share in kind_shares(flat.config, flat.curriculum))
+    return -(-flat.config.pool_size // (styles * kinds * len(REGIONS)))
 
 
 def _irregular_starts(site: Site, config: TaskConfig, log: Log) -> dict[int, Starts]:

@@ -10,7 +10,7 @@ from getup_jax.physics.surface import TOUCH_M, lift
 from getup_jax.physics.terrain import HeightField
 
 
-def set_down(
+def project_to_ground(
     character: CharacterSpec,
     field: HeightField,
     qpos: np.ndarray,
