@@ -169,9 +169,7 @@ def carry_over(
     decoder, fits = env.decoder(world), teacher.fits(learner)
     if fits and teacher.decoder.same(decoder):
         return teacher.policy
-    log(
-        "its networks, observation, prior or offsets are others: distilling it into this run's ..."
-    )
+    log("its networks, observation, prior or offsets are others: distilling it into this run's ...")
     demonstrate = functools.partial(_demonstrate, teacher, env, decoder)
     policy, seen = teacher.policy if fits else own, []
 

@@ -1,4 +1,4 @@
-"""DAgger warm start of composite motion: the actor learns what comes next in the clips, before training.
+"""DAgger warm start of composite motion: what comes next in the clips is learned before training.
 
 A fresh actor holds the clips' mean pose. Each step of learning from there first ends fewer falls,
 and a character that stands still falls least: it comes to rest in some pose of the clips, where the

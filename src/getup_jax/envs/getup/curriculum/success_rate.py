@@ -1,4 +1,4 @@
-"""Running success of what episodes are counted by: cells of start prioritisation, regions of the ground."""
+"""Success rates of what episodes are counted by: cells of start prioritisation, and regions."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from getup_jax.cli import main as cli
 from getup_jax.config import ConfigError, load
 from getup_jax.core.resources import config_path
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 
 class FakeTrain(types.ModuleType):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-SCRIPT = Path(__file__).parent.parent / "docs" / "plot_return_rate.py"
+SCRIPT = Path(__file__).parents[2] / "docs" / "plot_return_rate.py"
 spec = importlib.util.spec_from_file_location("plot_return_rate", SCRIPT)
 assert spec is not None
 assert spec.loader is not None
