@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from getup_jax.evaluation.composite import score_composite
+from getup_jax.evaluation.composite import score_composite, to_json
 from getup_jax.evaluation.composite_rollout import make_player, policy_in, run_composite
 from getup_jax.runtime import checkpoint
 from getup_jax.runtime.pytree_store import CheckpointError
@@ -95,7 +95,7 @@ def _play(folder: Path, paths: list[Path], number: int) -> list[dict[str, Any]]:
     for path in paths:
         loaded = checkpoint.load_policy(path)
         episodes = run_composite(job, policy_in(job, loaded), number, 0, player)
-        scores = score_composite(built, episodes)
+        scores = to_json(score_composite(built, episodes))
         entry = {"checkpoint": path.name, "steps": loaded.metadata["steps"], **scores}
         print(f"{folder} {path.name}: {entry['imitation_error_m']}", flush=True)
         found.append(entry)

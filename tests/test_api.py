@@ -37,8 +37,8 @@ def test_evaluate_is_what_the_command_says(policy):
     scores = gj.evaluate(policy, gj.Scenario(episodes=28, seed=3))
     assert scores.episodes == 28
     assert scores.success > 0.9
-    with pytest.raises(ConfigError, match="composite motion"):
-        gj.evaluate("walk")
+    with pytest.raises(ConfigError, match="--push: only for policies of the get-up task"):
+        gj.evaluate("walk", gj.Scenario(push_ns=9.0))
 
 
 def test_what_is_not_possible_is_one_line(policy):

@@ -1,8 +1,8 @@
 """A simulator and trainer that teaches a physics-based humanoid to get up.
 
-`load_policy`, `make_env`, `train`, `evaluate`, `load_config`, `Scenario`, `Policy` and `Env` are
-the front door, see docs/python.md; they are imported when they are first used, since commands that
-only answer a wrong option must not wait for JAX.
+`load_policy`, `make_env`, `train`, `evaluate`, `load_config`, `Scenario`, `Policy`, `Env`,
+`register_goal` and `register_reward` are the front door, see docs/python.md; they are imported when
+they are first used, since commands that only answer a wrong option must not wait for JAX.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
         load_config,
         load_policy,
         make_env,
+        register_goal,
+        register_reward,
         train,
     )
 
@@ -30,6 +32,8 @@ __all__ = [
     "load_config",
     "load_policy",
     "make_env",
+    "register_goal",
+    "register_reward",
     "train",
 ]
 

@@ -25,8 +25,11 @@ import jax
 from getup_jax.config import Config, ConfigError
 from getup_jax.config.load import load_config as _load_config
 from getup_jax.core.types import StepOutput
+from getup_jax.envs.composite.goals.combine import GOALS
 from getup_jax.envs.getup.build import build_task
-from getup_jax.evaluation import composite_rollout, getup
+from getup_jax.envs.getup.user_rewards import REWARDS, RewardTerm
+from getup_jax.evaluation import composite_rollout, driver, getup
+from getup_jax.evaluation.composite import CompositeScores
 from getup_jax.evaluation.metrics import Scores
 from getup_jax.evaluation.scenario import Scenario
 from getup_jax.pose_prior import prior as pose_prior
@@ -36,6 +39,31 @@ from getup_jax.runtime.console import Display
 from getup_jax.training import run as _run
 
 Log = Callable[[str], None]
+
+
+def register_goal(goal: type) -> type:
+    """Make a goal of composite motion known by its `name`; usable as a decorator.
+
+    See docs/goals.md for what a goal is. Commands know it where a package has it as an entry point
+    of the group `getup_jax.goals`. Raises ConfigError where the name is taken.
+    """
+    GOALS.register(goal.name, goal)
+    return goal
+
+
+def register_reward(name: str) -> Callable[[RewardTerm], RewardTerm]:
+    """A decorator that makes a reward term of getting up known to `task.rewards`.
+
+    The term is a pure function of `RewardInputs` to [B] in [0, 1]. Commands know it where a package
+    has it as an entry point of the group `getup_jax.rewards`. Raises ConfigError where the name is
+    taken.
+    """
+
+    def register(term: RewardTerm) -> RewardTerm:
+        REWARDS.register(name, term)
+        return term
+
+    return register
 
 
 def _silent(text: str) -> None:
@@ -197,15 +225,15 @@ def train(
 
 def evaluate(
     policy: Policy | str | Path, scenario: Scenario | None = None, quiet: bool = True
-) -> Scores:
-    """What `getup-eval` says about a policy that gets up: success, errors, how the motion feels.
+) -> Scores | CompositeScores:
+    """What `getup-eval` says about a policy.
 
-    Raises ConfigError for what it cannot be asked.
+    `Scores` of one that gets up: success, errors, how the motion feels. `CompositeScores` of one of
+    composite motion: imitation by group, goals, falls. Raises ConfigError for what it cannot be
+    asked.
     """
     policy = policy if isinstance(policy, Policy) else load_policy(policy)
-    if policy.config.composite_motion:
-        raise ConfigError(f"{policy.name}: is of composite motion; use getup-eval --ckpt")
     scenario = scenario or Scenario()
-    number = getup.evaluation_config(policy.config, scenario).task.pool_size
+    number = driver.episode_count(policy.loaded, scenario)
     with Display(number, quiet, unit="episodes") as display:
-        return getup.evaluate(policy.loaded, scenario, display)[1]
+        return driver.evaluate(policy.loaded, scenario, display).scores

@@ -32,7 +32,8 @@ CONFIG = Config(
 
 def changed(config: Config = CONFIG, **settings: Any) -> Config:
     """The config with other settings of its task and its curriculum, by their names alone."""
-    task = {name: value for name, value in settings.items() if hasattr(TaskConfig, name)}
+    names = {field.name for field in dataclasses.fields(TaskConfig)}
+    task = {name: value for name, value in settings.items() if name in names}
     aids = {name: value for name, value in settings.items() if name not in task}
     return dataclasses.replace(
         config,

@@ -102,9 +102,9 @@ def test_a_character_that_plays_the_clips_has_no_error():
     fell = np.zeros((1, frames), bool)
     episodes = CompositeEpisodes(position[None], quaternion[None], qpos[None], fell, *no_goals)
     scores = score_composite(task, episodes)
-    for error in scores["imitation_error_m"].values():
-        assert_allclose(error["mean"], 0.0, atol=1e-5)
-        assert_allclose(error["travel"], 1.0, atol=0.05)
+    for group in scores.groups.values():
+        assert_allclose(group.mean, 0.0, atol=1e-5)
+        assert_allclose(group.travel, 1.0, atol=0.05)
     still = CompositeEpisodes(
         np.repeat(position[None, :1], frames, axis=1),
         np.repeat(quaternion[None, :1], frames, axis=1),
@@ -113,9 +113,9 @@ def test_a_character_that_plays_the_clips_has_no_error():
         *no_goals,
     )
     worse = score_composite(task, still)
-    assert worse["imitation_error_m"]["lower"]["mean"] > 0.05
-    assert worse["imitation_error_m"]["lower"]["travel"] == 0.0
-    assert worse["fall_share"] == 1.0
+    assert worse.groups["lower"].mean > 0.05
+    assert worse.groups["lower"].travel == 0.0
+    assert worse.fall_share == 1.0
 
 
 @pytest.mark.parametrize(

@@ -6,17 +6,14 @@ import argparse
 import json
 import time
 from pathlib import Path
+from typing import Any
 
 from getup_jax.config import ConfigError
-from getup_jax.evaluation import control_gain, plot
-from getup_jax.evaluation import film as films
-from getup_jax.evaluation.composite import evaluate_composite
-from getup_jax.evaluation.getup import description, evaluate, evaluate_edits, evaluation_config
-from getup_jax.evaluation.metrics import to_json
-from getup_jax.evaluation.rollout import Episodes
+from getup_jax.evaluation import driver, film, plot, steering
 from getup_jax.evaluation.scenario import Scenario
-from getup_jax.evaluation.table import table
+from getup_jax.evaluation.steering_script import read_script
 from getup_jax.runtime import checkpoint
+from getup_jax.runtime.checkpoint import LoadedPolicy
 from getup_jax.runtime.console import Display
 
 
@@ -24,33 +21,47 @@ def evaluate_command(args: argparse.Namespace) -> int:
     """The command line of `getup-eval`; returns the exit code."""
     begin = time.monotonic()
     if args.video is not None:
-        films.require()
+        film.require()
     if args.plot is not None:
         plot.require()
-    loaded = checkpoint.load_policy(args.ckpt)
-    if loaded.config.composite_motion:
-        return evaluate_composite(args, loaded)
+    loaded, scenario = checkpoint.load_policy(args.ckpt), to_scenario(args)
     if args.script is not None:
-        raise ConfigError("--script: only for policies of composite motion")
-    scenario = to_scenario(args)
+        return _steer(args, loaded, scenario)
     # a mistake is said before anything is built
-    number = evaluation_config(loaded.config, scenario).task.pool_size
+    number = driver.episode_count(loaded, scenario, plotted=args.plot is not None)
     with Display(number, unit="episodes") as display:
-        display.log(f"{loaded.path}: {loaded.metadata.get('steps', 0):,} steps of training")
-        episodes, scores = evaluate(loaded, scenario, display)
-    control = evaluate_edits(loaded, episodes.task, scenario) if scenario.edits else None
-    print(table(scores))
-    if control is not None:
-        print(control_gain.table({args.ckpt: control}))
+        found = driver.evaluate(loaded, scenario, display)
+    print(found.table)
     print(f"{number} episodes in {time.monotonic() - begin:.0f} s")
-    if args.json is not None:
-        facts = description(loaded, scenario, episodes)
-        if control is not None:
-            facts["control_gain"] = control_gain.to_json(control)
-            facts["success_edits"] = control.success
-        args.json.write_text(json.dumps({**to_json(scores), **facts}, indent=2) + "\n")
-    _write_pictures(args.video, args.plot, episodes)
+    _write(args.json, found.facts)
+    if args.plot is not None:
+        found.plot(args.plot)
+        print(f"plot: {args.plot}")
+    if args.video is not None:
+        found.film(args.video)
+        print(f"video: {args.video}")
     return 0
+
+
+def _steer(args: argparse.Namespace, loaded: LoadedPolicy, scenario: Scenario) -> int:
+    """One character that is steered by a script."""
+    if not loaded.config.composite_motion:
+        raise ConfigError("--script: only for policies of composite motion")
+    scenario.check_composite()
+    if args.plot is not None:
+        raise ConfigError("--plot: not with --script; run getup-eval once more without it")
+    course, task = steering.steer(loaded, scenario, read_script(args.script))
+    print(steering.table(course))
+    _write(args.json, steering.to_json(course))
+    if args.video is not None:
+        steering.film(args.video, task, course)
+        print(f"video: {args.video}")
+    return 0
+
+
+def _write(path: Path | None, facts: dict[str, Any]) -> None:
+    if path is not None:
+        path.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
 
 
 def to_scenario(args: argparse.Namespace) -> Scenario:
@@ -71,12 +82,3 @@ def to_scenario(args: argparse.Namespace) -> Scenario:
         terrain_seed=args.terrain_seed,
         engine=args.engine,
     )
-
-
-def _write_pictures(film: Path | None, picture: Path | None, episodes: Episodes) -> None:
-    if picture is not None:
-        plot.plot(picture, episodes)
-        print(f"plot: {picture}")
-    if film is not None:
-        films.film(film, episodes)
-        print(f"video: {film}")

@@ -23,6 +23,8 @@ class TaskConfig:
     offset_scale: float = number(1.0, least=0, most=10)  # rad, PD offset of a filtered action of 1
     # c of the naturalness reward (equation 3)
     offset_limit_rad: float = number(10.0, above=0, most=1000)
+    # reward terms of users by name, with exponents: factors of the reward, see docs/extending.md
+    rewards: dict[str, float] = number({}, above=0, most=100)
     # how far past a joint limit a PD target may lie
     target_margin_rad: float = number(0.5, least=0, most=10)
     terminate_reward: float = number(0.1, least=0, most=1)  # early end below this task reward ...

@@ -98,16 +98,27 @@ class StepOutput:
     reward: jax.Array  # [B, K]
     terminated: jax.Array  # [B] bool, failure: no value beyond this step
     truncated: jax.Array  # [B] bool, time limit: the final observation's value bootstraps
-    metrics: dict[str, jax.Array]  # name -> [B], averaged over all steps
+    # name -> [B], what the rewards are made of; cause -> [B] bool, why episodes end early, all that
+    # hold; name -> [B], what else is averaged over all steps
+    terms: dict[str, jax.Array] = struct.field(default_factory=dict)
+    ended: dict[str, jax.Array] = struct.field(default_factory=dict)
+    metrics: dict[str, jax.Array] = struct.field(default_factory=dict)
     # name -> [B], verdicts on the episodes that are `done`: averaged over those and not NaN; NaN
     # says that the name means nothing for such an episode; elsewhere they say nothing
-    episode: dict[str, jax.Array]
+    episode: dict[str, jax.Array] = struct.field(default_factory=dict)
     extras: Any = None  # pytree [B, ...] that a learner stage needs (discriminator windows)
 
     @property
     def done(self) -> jax.Array:
         """[B] bool, where an episode ended in this step, and another one has begun."""
         return self.terminated | self.truncated
+
+    @property
+    def logged(self) -> dict[str, jax.Array]:
+        """name -> [B], all that is averaged over steps: reward_TERM, ended_CAUSE, and metrics."""
+        terms = {f"reward_{name}": value for name, value in self.terms.items()}
+        ended = {f"ended_{name}": x.astype(jnp.float32) for name, x in self.ended.items()}
+        return terms | ended | self.metrics
 
 
 class Environment(Protocol):

@@ -1,26 +1,20 @@
-"""`getup-eval` of a composite-motion policy: imitation error of every group, falls, a film."""
+"""Scores of a policy of composite motion: imitation error of every group, goals, falls."""
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
-import json
-import time
 from typing import Any
 
 import jax
 import numpy as np
 
-from getup_jax.config import Config, ConfigError
+from getup_jax.config import Config
 from getup_jax.envs.composite.build import BuiltComposite
 from getup_jax.envs.composite.groups import Group
 from getup_jax.envs.composite.reference_state_init import resampled
 from getup_jax.envs.composite.reference_windows import link_poses
-from getup_jax.evaluation import meta_weights_plot
-from getup_jax.evaluation.composite_film import film
 from getup_jax.evaluation.composite_rollout import CompositeEpisodes, restore, run_composite
-from getup_jax.evaluation.steering import steer_command
-from getup_jax.evaluation.steering_script import read_script
+from getup_jax.evaluation.scenario import Scenario
 from getup_jax.motion.clips import Clip
 from getup_jax.motion.dtw import imitation_error
 from getup_jax.runtime.checkpoint import LoadedPolicy
@@ -29,66 +23,93 @@ from getup_jax.runtime.console import Display
 EPISODES = 32  # by default
 
 
-def evaluate_composite(args: argparse.Namespace, loaded: LoadedPolicy) -> int:
-    """Run, score, print, and write what the arguments ask for; returns the exit code."""
-    begin = time.monotonic()
-    _refuse_getup_options(args)
-    config = evaluation_config(args, loaded.config)
-    if args.plot is not None:
-        assert config.composite is not None
-        meta_weights_plot.check(config.composite)
-    if args.script is not None:
-        return steer_command(args, loaded, config, read_script(args.script))
-    number = args.episodes or EPISODES
-    with Display(number, unit="episodes") as display:
-        display.log(f"{loaded.path}: {loaded.metadata.get('steps', 0):,} steps of training")
-        found = restore(config, loaded, display.log)
-        episodes = run_composite(found.job, found.policy, number, args.seed)
-        scores = score_composite(found.built, episodes)
-    print(_table(scores))
-    print(f"{number} episodes in {time.monotonic() - begin:.0f} s")
-    if args.json is not None:
-        facts = {"path": str(loaded.path), "seed": loaded.config.seed, **loaded.metadata}
-        args.json.write_text(json.dumps({**scores, "policy": facts}, indent=2) + "\n")
-    if args.plot is not None:
-        meta_weights_plot.plot_weights(args.plot, found.built.environment.character, episodes)
-        print(f"plot: {args.plot}")
-    if args.video is not None:
-        film(args.video, found.built, episodes)
-        print(f"video: {args.video}")
-    return 0
+@dataclasses.dataclass(frozen=True)
+class GroupScore:
+    """How a group imitates its clips."""
+
+    mean: float  # imitation error (m), over episodes
+    std: float
+    travel: float  # how far its links move, as a share of what they do in the clips
 
 
-def score_composite(task: BuiltComposite, episodes: CompositeEpisodes) -> dict[str, Any]:
-    """Imitation error (m) of every group, mean and std over episodes, and the share of falls.
+@dataclasses.dataclass(frozen=True)
+class GoalScore:
+    """How a goal is reached."""
 
-    `travel` is how far the group's links move, as a share of what they do in the clips: a
-    character that stands still in a typical pose has a small error too, where the clips move
-    little.
+    reward: float  # mean over all steps
+    success: float | None  # share of the attempts, mean over episodes; None: there were none
+
+
+@dataclasses.dataclass(frozen=True)
+class CompositeScores:
+    """Means over the episodes of a policy of composite motion."""
+
+    groups: dict[str, GroupScore]
+    goals: dict[str, GoalScore]
+    meta_weight: dict[str, dict[str, float]]  # mean and std of w over the hinges of every group
+    ratio: float  # largest imitation error of a group by the smallest
+    fall_share: float  # of the episodes, that have a fall
+    episodes: int
+
+
+def evaluate(
+    loaded: LoadedPolicy, scenario: Scenario, display: Display
+) -> tuple[BuiltComposite, CompositeEpisodes, CompositeScores]:
+    """Run and score the episodes; raises ConfigError where the policy cannot be asked that."""
+    scenario.check_composite()
+    found = restore(evaluation_config(loaded.config, scenario), loaded, display.log)
+    episodes = run_composite(found.job, found.policy, episode_count(scenario), scenario.seed)
+    return found.built, episodes, score_composite(found.built, episodes)
+
+
+def episode_count(scenario: Scenario) -> int:
+    """As many as asked for, or the default."""
+    return scenario.episodes or EPISODES
+
+
+def score_composite(task: BuiltComposite, episodes: CompositeEpisodes) -> CompositeScores:
+    """The imitation of every group, what became of the goals, and the share of falls.
+
+    The travel of a group belongs beside its error: a character that stands still in a typical pose
+    has a small error too, where the clips move little.
     """
-    errors = {}
+    groups = {}
     for group in task.environment.groups:
         motion, references = _compared(task, group, episodes)
         each = group_errors(motion, references)
-        errors[group.name] = {"mean": float(each.mean()), "std": float(each.std())}
         own = np.mean([_speed(reference) for reference in references])
-        errors[group.name]["travel"] = float(_speed(motion) / max(own, 1e-9))
-    means = [error["mean"] for error in errors.values()]
+        travel = float(_speed(motion) / max(own, 1e-9))
+        groups[group.name] = GroupScore(float(each.mean()), float(each.std()), travel)
+    means = [group.mean for group in groups.values()]
     goals = {}
     for index, name in enumerate(task.environment.goals.names):
         share = episodes.goal_success[:, index]
         known = share[np.isfinite(share)]
-        goals[name] = {
-            "reward": float(episodes.goal_reward[:, :, index].mean()),
-            "success": float(known.mean()) if known.size else None,
-        }
+        goals[name] = GoalScore(
+            reward=float(episodes.goal_reward[:, :, index].mean()),
+            success=float(known.mean()) if known.size else None,
+        )
+    return CompositeScores(
+        groups=groups,
+        goals=goals,
+        meta_weight=_meta_weights(task, episodes),
+        ratio=max(means) / max(min(means), 1e-9),
+        fall_share=float(episodes.fell.any(axis=1).mean()),
+        episodes=len(episodes.fell),
+    )
+
+
+def to_json(scores: CompositeScores) -> dict[str, Any]:
+    """The scores as plain values; `imitation_error_m` are those of the groups."""
+    values = dataclasses.asdict(scores)
+    return {"imitation_error_m": values.pop("groups"), **values}
+
+
+def description(loaded: LoadedPolicy, scenario: Scenario, task: BuiltComposite) -> dict[str, Any]:
+    """Whose scores they are, and under which conditions."""
     return {
-        "goals": goals,
-        "meta_weight": _meta_weights(task, episodes),
-        "imitation_error_m": errors,
-        "ratio": max(means) / max(min(means), 1e-9),
-        "fall_share": float(episodes.fell.any(axis=1).mean()),
-        "episodes": len(episodes.fell),
+        "policy": {"path": str(loaded.path), "seed": loaded.config.seed, **loaded.metadata},
+        "conditions": {"seed": scenario.seed, "engine": task.environment.engine.name},
     }
 
 
@@ -142,43 +163,26 @@ def _seen(group: Group, position: np.ndarray, quaternion: np.ndarray) -> np.ndar
     return np.asarray(group.positions(window))[:, :, 0]
 
 
-def evaluation_config(args: argparse.Namespace, config: Config) -> Config:
-    """The training config with the seed and the engine of the arguments."""
-    config = dataclasses.replace(config, seed=args.seed)
-    if args.engine is not None:
-        physics = dataclasses.replace(config.physics, engine=args.engine, solver="auto")
+def evaluation_config(config: Config, scenario: Scenario) -> Config:
+    """The training config with the seed and the engine of the scenario."""
+    config = dataclasses.replace(config, seed=scenario.seed)
+    if scenario.engine is not None:
+        physics = dataclasses.replace(config.physics, engine=scenario.engine, solver="auto")
         config = dataclasses.replace(config, physics=physics)
     return config
 
 
-def _refuse_getup_options(args: argparse.Namespace) -> None:
-    """Options that only mean something for getting up."""
-    given = {
-        "--curves": bool(args.curves),
-        "--blend": args.blend is not None,
-        "--push": args.push is not None,
-        "--drops": args.drops is not None,
-        "--edits": args.edits is not None,
-        "--start standing": args.start == "standing",
-        "--terrain-seed": args.terrain_seed is not None,
-    }
-    if args.script is not None and args.plot is not None:
-        raise ConfigError("--plot: not with --script; run getup-eval once more without it")
-    wrong = [name for name, is_given in given.items() if is_given]
-    if wrong:
-        raise ConfigError(f"{', '.join(wrong)}: only for policies of the get-up task")
-
-
-def _table(scores: dict[str, Any]) -> str:
+def table(scores: CompositeScores) -> str:
+    """The scores in lines for people."""
     lines = ["group            imitation error (m)   travel (share of the clips')"]
-    for name, error in scores["imitation_error_m"].items():
-        spread = f"{error['mean']:.3f} +- {error['std']:.3f}"
-        lines.append(f"{name:16} {spread:21} {error['travel']:.2f}")
-    for name, goal in scores["goals"].items():
-        share = "-" if goal["success"] is None else f"{100 * goal['success']:.0f} %"
-        lines.append(f"{name:16} reward {goal['reward']:.3f}, reached {share}")
-    for name, weight in scores["meta_weight"].items():
+    for name, group in scores.groups.items():
+        spread = f"{group.mean:.3f} +- {group.std:.3f}"
+        lines.append(f"{name:16} {spread:21} {group.travel:.2f}")
+    for name, goal in scores.goals.items():
+        share = "-" if goal.success is None else f"{100 * goal.success:.0f} %"
+        lines.append(f"{name:16} reward {goal.reward:.3f}, reached {share}")
+    for name, weight in scores.meta_weight.items():
         lines.append(f"{name:16} weight of the meta policy {weight['mean']:.2f}")
-    lines.append(f"largest / smallest {scores['ratio']:.2f}")
-    lines.append(f"episodes with a fall {100 * scores['fall_share']:.0f} %")
+    lines.append(f"largest / smallest {scores.ratio:.2f}")
+    lines.append(f"episodes with a fall {100 * scores.fall_share:.0f} %")
     return "\n".join(lines)

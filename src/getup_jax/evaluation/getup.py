@@ -86,13 +86,15 @@ def _places(config: Config, task: BuiltTask, plan: Plan) -> Places | None:
     return Places.of(plan.region, xy, config.terrain)
 
 
-def evaluate_edits(loaded: LoadedPolicy, task: BuiltTask, scenario: Scenario) -> ControlGain:
+def evaluate_edits(
+    loaded: LoadedPolicy, task: BuiltTask, scenario: Scenario, log: Callable[[str], None]
+) -> ControlGain:
     """How well the policy obeys edits of the task's curves; see `evaluation/control_gain.py`."""
     learner, policy = restore_policy(loaded, task)
     plan = control_gain.edit_plan(task, scenario.edits, scenario.seed)
     number = len(plan.getup)
+    log(f"{scenario.edits} edits of each curve ...")
     with Display(number, unit="episodes") as display:
-        display.log(f"{scenario.edits} edits of each curve ...")
         return control_gain.measure(task, learner, policy, plan, Rate(display, number))
 
 

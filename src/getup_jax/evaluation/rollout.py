@@ -132,7 +132,7 @@ class Roller:
             time=state.time,
             duration=state.duration,
             qpos=kinematics.qpos,
-            task_reward=output.metrics["reward_task"],
+            task_reward=output.terms["task"],
             torque=jnp.abs(kinematics.torque).mean(axis=-1),
             power=motion_quality.power(kinematics.torque, rates[-1]),
             jerk=motion_quality.jerk(rates, env.engine.control_dt),

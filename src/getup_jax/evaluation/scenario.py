@@ -69,6 +69,25 @@ class Scenario:
                 f"lasts {stand_s:g} s; give a longer --stand-time"
             )
 
+    def check_composite(self) -> None:
+        """Raise ConfigError for what only means something for getting up."""
+        given = {
+            "--curves": bool(self.curves),
+            "--motions": self.motions is not None,
+            "--blend": self.blend is not None,
+            "--push": self.push_ns is not None,
+            "--drops": self.drops is not None,
+            "--edits": self.edits > 0,
+            "--start standing": self.start == "standing",
+            "--start-noise": self.start_noise_rad > 0,
+            "--duration-scale": self.duration_scale != (1.0, 1.0),
+            "--stand-time": self.stand_time_s is not None,
+            "--terrain-seed": self.terrain_seed is not None,
+        }
+        wrong = [name for name, is_given in given.items() if is_given]
+        if wrong:
+            raise ConfigError(f"{', '.join(wrong)}: only for policies of the get-up task")
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Plan:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,8 +14,10 @@ from getup_jax.config import Config, ConfigError
 from getup_jax.envs.composite.goals import Marker
 from getup_jax.envs.composite.goals.combine import equipment_of
 from getup_jax.envs.composite.task import CompositeTask
+from getup_jax.evaluation.composite import evaluation_config
 from getup_jax.evaluation.composite_film import write
 from getup_jax.evaluation.composite_rollout import restore, task_of, without_noise
+from getup_jax.evaluation.scenario import Scenario
 from getup_jax.evaluation.steering_script import Command, Script
 from getup_jax.runtime.checkpoint import LoadedPolicy, load_policy
 from getup_jax.runtime.console import Display
@@ -50,22 +50,22 @@ class Course:
     fell_s: float | None  # when it first fell
 
 
-def steer_command(
-    args: argparse.Namespace, loaded: LoadedPolicy, config: Config, script: Script
-) -> int:
-    """Run a script, print what came of it, write the film and the JSON; returns the exit code."""
+def steer(loaded: LoadedPolicy, scenario: Scenario, script: Script) -> tuple[Course, CompositeTask]:
+    """Run a script with a policy and those that it switches to; also the task that they share."""
+    config = evaluation_config(loaded.config, scenario)
     with Display(len(script.commands), unit="commands") as display:
         players = load_players(loaded, config, script, display.log)
-        course = run_script(players, script, args.seed)
-    env = players[None].task
-    print(_table(course))
-    if args.json is not None:
-        content = {"results": course.results, "fell_s": course.fell_s}
-        args.json.write_text(json.dumps(content, indent=2) + "\n")
-    if args.video is not None:
-        write(args.video, env, [(course.qpos, course.markers, course.lines)])
-        print(f"video: {args.video}")
-    return 0
+        return run_script(players, script, scenario.seed), players[None].task
+
+
+def film(path: Path, env: CompositeTask, course: Course) -> None:
+    """The whole course, with what the character is told."""
+    write(path, env, [(course.qpos, course.markers, course.lines)])
+
+
+def to_json(course: Course) -> dict[str, Any]:
+    """What became of every command, and when the character fell."""
+    return {"results": course.results, "fell_s": course.fell_s}
 
 
 def load_players(
@@ -234,7 +234,8 @@ def _check_goals(script: Script, known: dict[str | None, set[str]]) -> None:
                 )
 
 
-def _table(course: Course) -> str:
+def table(course: Course) -> str:
+    """What became of every command, in lines for people."""
     lines = []
     for result in course.results:
         said = Command(0.0, None, {result["goal"]: result["order"]}).text

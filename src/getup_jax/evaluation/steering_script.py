@@ -17,7 +17,8 @@ from typing import Any
 from getup_jax.config import ConfigError, yaml_text
 from getup_jax.config.check import shown
 from getup_jax.config.ranges import Range, check
-from getup_jax.envs.composite.goals.combine import GOALS, check_name
+from getup_jax.config.registry import check_name
+from getup_jax.envs.composite.goals.combine import GOALS
 from getup_jax.envs.composite.goals.goal import REQUIRED
 
 _MOST = 1e6  # s, m, degrees

@@ -48,7 +48,7 @@ def rollout(
         action, log_prob = policy(environment.observation, key_step)
         following, output = env.step(world, environment, action)
         transition = _transition(environment.observation, action, log_prob, output)
-        return following, (transition, output.metrics, output.episode)
+        return following, (transition, output.logged, output.episode)
 
     keys = jax.random.split(key, num_steps)
     environment, (transition, metrics, episode) = jax.lax.scan(act_and_step, environment, keys)

@@ -132,7 +132,7 @@ class Sampler:
         action = (wanted - (1.0 - share) * state.action) / share
         key = jnp.zeros(2, jnp.uint32)
         state, output = self.env.advance(world, state.replace(key=key), action)
-        return state.replace(key=None), output.metrics["reward_task"]
+        return state.replace(key=None), output.terms["task"]
 
     def _cost(
         self, world: World, state: EpisodeState, now: Reference, pose: jax.Array | float

@@ -161,12 +161,12 @@ def test_ten_steps_of_low_reward_end_an_episode_and_nine_do_not(jitted):
     # standing while the curve lies: the height alone gives exp(-1.7 * 1.3) = 0.1
     state = at_time(jitted.start(STANDING), -1.0)
     _, (states, outputs) = jitted.play(jitted.world, state, 12)
-    assert (np.asarray(outputs.metrics["reward_task"]) < 0.1).all()
-    low = np.asarray(outputs.metrics["ended_low_reward"])
+    assert (np.asarray(outputs.terms["task"]) < 0.1).all()
+    low = np.asarray(outputs.ended["low_reward"])
     np.testing.assert_array_equal(low[:9], 0.0)
     np.testing.assert_array_equal(low[9:], 1.0)
     np.testing.assert_array_equal(outputs.terminated, low.astype(bool))
-    assert not np.asarray(outputs.metrics["ended_head"]).any()
+    assert not np.asarray(outputs.ended["head"]).any()
     assert not np.asarray(outputs.truncated).any()
     np.testing.assert_array_equal(states.low_steps[:, 0], np.arange(1, 13))
 
@@ -189,11 +189,11 @@ def head_down(jitted, character) -> EpisodeState:
 
 def test_the_head_on_the_floor_for_ten_steps_ends_an_episode(jitted, character):
     _, (_, outputs) = jitted.play(jitted.world, head_down(jitted, character), 12)
-    head = np.asarray(outputs.metrics["ended_head"])
+    head = np.asarray(outputs.ended["head"])
     np.testing.assert_array_equal(head[:9], 0.0)
     np.testing.assert_array_equal(head[9:], 1.0)
     np.testing.assert_array_equal(outputs.terminated, head.astype(bool))
-    assert not np.asarray(outputs.metrics["ended_low_reward"]).any()
+    assert not np.asarray(outputs.ended["low_reward"]).any()
 
 
 def test_within_its_grace_a_head_on_the_floor_costs_the_reward_alone(jitted, character):
@@ -209,8 +209,8 @@ def test_within_its_grace_a_head_on_the_floor_costs_the_reward_alone(jitted, cha
     reward = np.asarray(outputs.reward)[..., 0]
     assert (reward[:9] > 0.1).all()
     np.testing.assert_array_equal(reward[9:], 0.0)
-    assert (np.asarray(outputs.metrics["reward_task"]) > 0.1).all()
-    head = np.asarray(outputs.metrics["ended_head"])
+    assert (np.asarray(outputs.terms["task"]) > 0.1).all()
+    head = np.asarray(outputs.ended["head"])
     np.testing.assert_array_equal(head[:12], 0.0)
     np.testing.assert_array_equal(head[12:], 1.0)
 
@@ -258,9 +258,9 @@ def test_holding_the_neutral_pose_is_a_success_with_nearly_full_reward(standing_
 
 def test_the_reward_is_the_product_of_its_terms(standing_episode):
     _, outputs = standing_episode
-    terms = {name: outputs.metrics[f"reward_{name}"] for name in ("task", "natural", "total")}
+    terms = {name: outputs.terms[name] for name in ("task", "natural", "total")}
     parts = ("height", "orientation", "velocity", "posture")
-    product = np.prod([outputs.metrics[f"reward_{name}"] for name in parts], axis=0)
+    product = np.prod([outputs.terms[name] for name in parts], axis=0)
     np.testing.assert_allclose(terms["task"], product, rtol=1e-5)
     np.testing.assert_allclose(terms["total"], terms["task"] * terms["natural"], rtol=1e-5)
     np.testing.assert_array_equal(outputs.reward[..., 0], terms["total"])
@@ -272,7 +272,7 @@ def test_offsets_cost_naturalness(jitted):
     filtered = no_action().at[:, LATENT:].set(0.1)
     _, output = jitted.advance(jitted.world, state.replace(action=filtered), filtered)
     # |dq|_1 = 4.9 of c = 10
-    np.testing.assert_allclose(output.metrics["reward_natural"], 1 - 0.49**2, rtol=1e-4)
+    np.testing.assert_allclose(output.terms["natural"], 1 - 0.49**2, rtol=1e-4)
 
 
 # Resets.
@@ -324,7 +324,7 @@ def test_a_broken_simulation_is_reset_without_reward_and_the_run_goes_on(jitted)
     state = state.replace(physics=physics, key=jax.random.PRNGKey(4))
     after, output = jitted.step(jitted.world, state, state.action)
     np.testing.assert_array_equal(output.terminated, [False, True, False, False])
-    np.testing.assert_array_equal(output.metrics["ended_not_finite"], [0, 1, 0, 0])
+    np.testing.assert_array_equal(output.ended["not_finite"], [0, 1, 0, 0])
     np.testing.assert_array_equal(output.reward[1], 0.0)
     assert (np.asarray(output.reward)[[0, 2, 3]] > 0.5).all()
     for metric in output.metrics.values():

@@ -170,25 +170,26 @@ class CompositeTask:
         """What a step returns; the imitation rewards are 0 until a discriminator gives them."""
         kinematics = state.physics.kinematics
         causes = {
-            "ended_fall": kinematics.finite & self.has_fallen(kinematics),
-            "ended_not_finite": ~kinematics.finite,
+            "fall": kinematics.finite & self.has_fallen(kinematics),
+            "not_finite": ~kinematics.finite,
         }
         names = self.goals.names
-        causes |= {f"ended_{n}": goal.terminated for n, goal in zip(names, goals, strict=True)}
+        causes |= {n: goal.terminated for n, goal in zip(names, goals, strict=True)}
         terminated = jnp.any(jnp.stack(list(causes.values())), axis=0)
         none = jnp.zeros(terminated.shape, jnp.float32)
         rewards = [none for _ in self.groups] + [goal.reward for goal in goals]
         reward = jnp.stack(rewards, axis=-1)
         last = round(self.config.episode_s / self.engine.control_dt)
         windows = self.windows(state.history)
-        causes_seen = {name: cause.astype(jnp.float32) for name, cause in causes.items()}
         return StepOutput(
             observation=state.observation,
             final_observation=state.observation,
             reward=jnp.where(terminated[:, None], self.config.end_reward, reward),
             terminated=terminated,
             truncated=~terminated & (state.step >= last),
-            metrics=self._likeness(world, windows) | causes_seen,
+            terms={},
+            ended=causes,
+            metrics=self._likeness(world, windows),
             episode={"steps": state.step.astype(jnp.float32)} | self.success(state),
             extras=windows,
         )

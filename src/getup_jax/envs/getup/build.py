@@ -12,11 +12,13 @@ import numpy as np
 
 from getup_jax.config import Config, ConfigError, MotionConfig, TerrainConfig
 from getup_jax.core.resources import asset_path, cache_dir
+from getup_jax.envs.getup import user_rewards
 from getup_jax.envs.getup.curriculum.curriculum import Curriculum
 from getup_jax.envs.getup.observation import Observer
 from getup_jax.envs.getup.resets.lying_bodies import LimpBodies
 from getup_jax.envs.getup.resets.pool import FlatStarts, build_pool
 from getup_jax.envs.getup.resets.region_pool import Site, build_region_pool
+from getup_jax.envs.getup.rewards import RESERVED
 from getup_jax.envs.getup.symmetry import find_symmetry
 from getup_jax.envs.getup.task import GetUpTask, World
 from getup_jax.motion.clips import GetUp
@@ -107,6 +109,7 @@ def assemble(
     log: Callable[[str], None],
 ) -> BuiltTask:
     """The task from its finished parts; `character` stands on a plane."""
+    user_rewards.check(config.task.rewards, RESERVED)
     site = None if config.terrain is None else _site(config, config.terrain)
     on_ground = character if site is None else site.character
     engine = make_engine(on_ground, config.physics)

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 
 TERMS = "height", "orientation", "velocity", "posture"  # of equation 4
+RESERVED = (*TERMS, "task", "natural", "total", "track")  # names of all terms of the task
 
 
 def height(value: jax.Array, target: jax.Array) -> jax.Array:

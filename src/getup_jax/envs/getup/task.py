@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import jax
 import jax.numpy as jnp
@@ -13,7 +14,7 @@ from getup_jax.core.masked_update import replace_rows
 from getup_jax.core.mirror import Symmetry
 from getup_jax.core.quaternion import angle, conjugate, multiply
 from getup_jax.core.types import Engine, StepOutput, take
-from getup_jax.envs.getup import rewards, terminations
+from getup_jax.envs.getup import rewards, terminations, user_rewards
 from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.curriculum import assistive_wrench, regions
 from getup_jax.envs.getup.curriculum.curriculum import Curriculum, is_alone, runs_to_the_end
@@ -23,6 +24,7 @@ from getup_jax.envs.getup.drawn_curves import Curve, style_curve
 from getup_jax.envs.getup.episode import EpisodeState, Record, recorded, verdict
 from getup_jax.envs.getup.observation import Observer, Posture
 from getup_jax.envs.getup.resets.pool import Pool
+from getup_jax.envs.getup.user_rewards import RewardInputs
 from getup_jax.motion.getup import curves
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain import Ground
@@ -79,7 +81,8 @@ class GetUpTask:
     @property
     def _term_names(self) -> tuple[str, ...]:
         """Without a pose prior there is nothing that offsets could be unnatural to [P 6.4]."""
-        return rewards.TERMS if self.latent_size == 0 else (*rewards.TERMS, "natural")
+        own = rewards.TERMS if self.latent_size == 0 else (*rewards.TERMS, "natural")
+        return (*own, *self.config.rewards)
 
     @property
     def action_size(self) -> int:
@@ -188,6 +191,9 @@ class GetUpTask:
         posture = self._posture(world, state)
         target = self.targets(state)[:, 0]
         terms = self._reward_terms(world, state, posture, target)
+        if self.config.rewards:
+            own = self._user_terms(state, posture, target)
+            terms |= own | {"total": math.prod(own.values(), start=terms["total"])}
         finite = physics.kinematics.finite
         terms = {name: jnp.where(finite, value, 0.0) for name, value in terms.items()}
         control_dt = self.engine.control_dt
@@ -210,15 +216,15 @@ class GetUpTask:
         state = recorded(state, value, target, terms["task"], stand_s)
         observation = jnp.where(finite[:, None], self._observe(state, posture), 0.0)
         state = state.replace(observation=observation)
-        metrics = {f"reward_{name}": value for name, value in terms.items()}
-        metrics |= {f"ended_{name}": value.astype(jnp.float32) for name, value in causes.items()}
         output = StepOutput(
             observation=observation,
             final_observation=observation,
             reward=jnp.stack([terms[name] for name in self.objective_weights], axis=-1),
             terminated=terminated,
             truncated=truncated,
-            metrics=metrics,
+            terms=terms,
+            ended=causes,
+            metrics={},
             episode=self._verdict(state, truncated),
         )
         return state, output
@@ -289,6 +295,19 @@ class GetUpTask:
         terms["natural"] = rewards.natural(offset, config.offset_limit_rad)
         terms["total"] = terms["total"] * terms["natural"]
         return terms
+
+    def _user_terms(
+        self, state: EpisodeState, posture: Posture, target: jax.Array
+    ) -> dict[str, jax.Array]:
+        """Those of `task.rewards`, which are factors of the total."""
+        inputs = RewardInputs(
+            kinematics=state.physics.kinematics,
+            posture=posture,
+            target=target,
+            phase=state.time / state.duration,
+            offset=self.config.offset_scale * state.action[:, self.latent_size :],
+        )
+        return user_rewards.terms(self.config.rewards, inputs)
 
     def _full_steps(self, state: EpisodeState) -> jax.Array:
         """Steps [B] that an episode with this start has, if it does not end early."""

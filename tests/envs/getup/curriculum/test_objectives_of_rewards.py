@@ -37,19 +37,19 @@ def one_step(built: BuiltTask):
 
 def test_what_is_paid_is_sharper_and_what_is_reported_is_the_papers(built, sharp):
     (plain_state, plain), (state, output) = one_step(built), one_step(sharp)
-    terms = {name: np.asarray(x) for name, x in output.metrics.items()}
+    terms = {name: np.asarray(x) for name, x in output.terms.items()}
     for name in ("height", "orientation", "velocity", "posture", "task", "natural"):
-        np.testing.assert_array_equal(terms[f"reward_{name}"], plain.metrics[f"reward_{name}"])
-    tracked = terms["reward_height"] * terms["reward_orientation"]
+        np.testing.assert_array_equal(terms[name], plain.terms[name])
+    tracked = terms["height"] * terms["orientation"]
     assert (tracked < 0.95).all()
-    total = terms["reward_task"] * terms["reward_natural"] * tracked**0.5
-    np.testing.assert_allclose(terms["reward_total"], total, rtol=1e-5)
-    np.testing.assert_allclose(terms["reward_track"], tracked**3, rtol=1e-5)
-    np.testing.assert_array_equal(output.reward[:, 0], terms["reward_total"])
-    np.testing.assert_array_equal(output.reward[:, 1], terms["reward_track"])
+    total = terms["task"] * terms["natural"] * tracked**0.5
+    np.testing.assert_allclose(terms["total"], total, rtol=1e-5)
+    np.testing.assert_allclose(terms["track"], tracked**3, rtol=1e-5)
+    np.testing.assert_array_equal(output.reward[:, 0], terms["total"])
+    np.testing.assert_array_equal(output.reward[:, 1], terms["track"])
     jax.tree.map(np.testing.assert_array_equal, state.record, plain_state.record)
     assert plain.reward.shape == (4, 1)
-    assert "reward_track" not in plain.metrics
+    assert "track" not in plain.terms
 
 
 def test_a_grace_time_pays_no_objective(character):
@@ -61,7 +61,7 @@ def test_a_grace_time_pays_no_objective(character):
     _, output = jax.jit(env.advance)(lenient.world, held, state.action)
     assert (np.asarray(output.reward[:2]) > 0.1).all()
     np.testing.assert_array_equal(output.reward[2:], 0.0)
-    assert (np.asarray(output.metrics["reward_task"]) > 0.1).all()
+    assert (np.asarray(output.terms["task"]) > 0.1).all()
 
 
 def test_the_learner_has_a_critic_each_with_the_weights_that_are_set(sharp, monkeypatch):
@@ -82,7 +82,7 @@ def test_each_term_can_be_an_objective_with_a_critic_of_its_own(character, built
     assert env.objective_weights == dict.fromkeys(terms, 1.0)
     _, output = one_step(dataclasses.replace(built, environment=env))
     for index, name in enumerate(terms):
-        np.testing.assert_array_equal(output.reward[:, index], output.metrics[f"reward_{name}"])
+        np.testing.assert_array_equal(output.reward[:, index], output.terms[name])
     assert output.reward.shape == (4, env.num_objectives)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from getup_jax.config import ConfigError
 from getup_jax.config.ranges import check_values
+from getup_jax.config.registry import Registry, check_name
 from getup_jax.core.types import Kinematics, PropCommand
 from getup_jax.envs.composite.goals.aiming import Aiming
 from getup_jax.envs.composite.goals.goal import Goal, GoalOutput, Marker
@@ -23,9 +23,8 @@ from getup_jax.envs.composite.goals.tennis_swing import TennisSwing
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.props import Ball, Equipment
 
-GOALS: dict[str, type] = {
-    goal.name: goal for goal in (TargetHeading, TargetLocation, Aiming, TennisSwing, Juggling)
-}
+_OWN: tuple[Any, ...] = (TargetHeading, TargetLocation, Aiming, TennisSwing, Juggling)
+GOALS: Registry[Any] = Registry("getup_jax.goals", {goal.name: goal for goal in _OWN})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,9 +126,7 @@ class Goals:
 
 def equipment_of(names: Collection[str]) -> Equipment:
     """What the character must be loaded with for the goals of a config, before they are made."""
-    for name in names:
-        check_name(name, tuple(GOALS), "composite.goals")
-    kinds = [GOALS[name] for name in names]
+    kinds = [GOALS.choose(name, "composite.goals") for name in names]
     balls = tuple(ball for kind in kinds for ball in kind.balls)
     return Equipment(balls=balls, racket=any(getattr(kind, "racket", False) for kind in kinds))
 
@@ -149,8 +146,7 @@ def _make(
     name: str, values: Mapping[str, Any] | None, character: CharacterSpec, control_dt: float
 ) -> Goal:
     key = f"composite.goals.{name}"
-    check_name(name, tuple(GOALS), "composite.goals")
-    goal = GOALS[name]
+    goal = GOALS.choose(name, "composite.goals")
     fields = {f.name: f for f in dataclasses.fields(goal) if f.default is not dataclasses.MISSING}
     given = {}
     for setting, value in (values or {}).items():
@@ -172,14 +168,6 @@ def _rising(value: Any, default: Any, key: str) -> Any:
         expected = f"{count} rising numbers" if count > 1 else "a number"
         raise ConfigError(f"{key}: expected {expected} such as {default}, got {value!r}")
     return tuple(numbers) if count > 1 else numbers[0]
-
-
-def check_name(name: str, known: tuple[str, ...], key: str) -> None:
-    """Raises ConfigError with a suggestion where a name is not known."""
-    if name not in known:
-        close = difflib.get_close_matches(name, known, n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
-        raise ConfigError(f"{key}: unknown {name!r}{hint} Known: {', '.join(known)}")
 
 
 def _with_balls(kinematics: Kinematics, own: slice) -> Kinematics:

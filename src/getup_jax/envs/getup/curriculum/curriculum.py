@@ -22,7 +22,7 @@ from getup_jax.envs.getup.curriculum import (
 )
 from getup_jax.envs.getup.curriculum.start_sampler import Draw, StartWorld
 from getup_jax.envs.getup.curriculum.state import CurriculumState
-from getup_jax.envs.getup.episode import EpisodeState, stands
+from getup_jax.envs.getup.episode import LYING, EpisodeState, stands
 from getup_jax.envs.getup.resets.pool import Pool
 
 
@@ -96,9 +96,9 @@ class Curriculum:
     ) -> tuple[regions.RegionProgress | None, StepOutput]:
         if self.terrain is None or state.regions is None or after.region is None:
             return None, output
-        verdict = output.episode["success"]
-        ended = output.done & ~jnp.isnan(verdict)
-        progress = regions.advance(state.regions, self.terrain, ended, verdict == 1.0, after.region)
+        counts = (after.kind == LYING) & runs_to_the_end(after) & is_alone(after)
+        ended, stood = output.done & counts, output.truncated & stands(after.record)
+        progress = regions.advance(state.regions, self.terrain, ended, ended & stood, after.region)
         opened = jnp.full(len(ended), progress.opened, jnp.float32)
         return progress, output.replace(metrics=output.metrics | {"regions_open": opened})
 

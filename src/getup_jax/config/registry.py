@@ -1,0 +1,75 @@
+"""Things of users by name: registered in Python, or by an installed package's entry points.
+
+A package that says in its pyproject.toml
+
+    [project.entry-points."getup_jax.goals"]
+    follow_me = "my_package.goals:FollowMe"
+
+is known to every command as soon as it is installed.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping
+from importlib.metadata import entry_points
+from typing import Any, TypeVar
+
+from getup_jax.config.check import ConfigError
+
+T = TypeVar("T")
+
+
+class Registry(Mapping[str, T]):
+    """Named things of one kind; entry points of the group are looked up at the first use."""
+
+    def __init__(self, group: str, own: Mapping[str, T]) -> None:
+        self._group, self._found, self._looked = group, dict(own), False
+
+    def register(self, name: str, thing: T) -> None:
+        """Add one; ConfigError where the name is taken by another."""
+        known = self._all().get(name, thing)
+        if known is not thing:
+            raise ConfigError(f"{name}: is registered in {self._group} already; choose another")
+        self._found[name] = thing
+
+    def choose(self, name: str, key: str) -> T:
+        """The one of that name; ConfigError of the setting `key` with the names that there are."""
+        check_name(name, tuple(self), key)
+        return self[name]
+
+    def __getitem__(self, name: str) -> T:
+        return self._all()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all())
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+    def _all(self) -> dict[str, T]:
+        if not self._looked:
+            self._looked = True
+            for point in entry_points(group=self._group):
+                self.register(point.name, _loaded(point))
+        return self._found
+
+
+def _loaded(point: Any) -> Any:
+    """What an entry point names; ConfigError that names the package where it cannot be had."""
+    try:
+        return point.load()
+    except Exception as error:  # whatever somebody's package does while it is imported
+        package = point.dist.name if point.dist else point.value
+        raise ConfigError(
+            f"{point.group}: {point.name} of {package} cannot be loaded: "
+            f"{type(error).__name__}: {error}; mend or uninstall it"
+        ) from error
+
+
+def check_name(name: str, known: tuple[str, ...], key: str) -> None:
+    """Raises ConfigError with a suggestion where a name is not known."""
+    if name not in known:
+        close = difflib.get_close_matches(name, known, n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        raise ConfigError(f"{key}: unknown {name!r}{hint} Known: {', '.join(known) or 'none'}")
