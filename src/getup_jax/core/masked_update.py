@@ -39,3 +39,21 @@ def replace_rows(
 
     start = jnp.zeros((), count.dtype)
     return jax.lax.while_loop(lambda carry: carry[0] < count, replace_chunk, (start, rows))[1]
+
+
+def running_mean(
+    mean: jax.Array,
+    index: tuple[jax.Array, ...],
+    counts: jax.Array,
+    good: jax.Array,
+    rate: float,
+) -> jax.Array:
+    """The running means [...] of entries after some of B results came in: which ones, [B] bool.
+
+    index: of the entries [B] that they count in; good [B]: 1, else 0; rate: share of a result in
+    its entry's mean.
+    """
+    number = jnp.zeros_like(mean).at[index].add(counts.astype(jnp.float32))
+    total = jnp.zeros_like(mean).at[index].add((counts & good).astype(jnp.float32))
+    share = 1.0 - (1.0 - rate) ** number
+    return mean + share * (total / jnp.maximum(number, 1.0) - mean)

@@ -9,10 +9,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from tiny_task import CONFIG, changed, tiny_task
+from tiny_task import changed, tiny_task
 
 from getup_jax.config import ConfigError, CurriculumConfig, TaskConfig
-from getup_jax.envs.getup.curriculum.start_sampler import draw_starts, with_curves
 from getup_jax.envs.getup.curriculum.state import CurriculumState
 from getup_jax.envs.getup.drawn_curves import (
     NOISE_RMS,
@@ -205,17 +204,17 @@ def test_the_share_of_drawn_curves_is_that_of_the_setting():
 
 
 def test_without_drawn_curves_starts_are_what_they_were(built):
-    world, config, none = built.world, CONFIG.training_aids, CurriculumState()
-    starts = draw_starts(config, 0.3, world, KEY, 64, none)
-    assert with_curves(config, MATCH_RAD, world, KEY, starts) is starts
-    some = dataclasses.replace(config, drawn_curves=0.5)
-    others = draw_starts(some, 0.3, world, KEY, 64, none)
-    drawn = with_curves(some, MATCH_RAD, world, KEY, others)
+    world, aids, none = built.world, built.environment.curriculum, CurriculumState()
+    starts = aids.draw(world, none, KEY, 64)
+    assert aids.with_curves(world, KEY, starts) is starts
+    config = dataclasses.replace(aids.config, drawn_curves=0.5)
+    some = dataclasses.replace(aids, config=config)
+    drawn = some.with_curves(world, KEY, some.draw(world, none, KEY, 64))
     for name in ("getup", "kind", "row"):
         np.testing.assert_array_equal(getattr(drawn, name), getattr(starts, name))
-    again = with_curves(some, MATCH_RAD, world, KEY, starts)
+    again = some.with_curves(world, KEY, starts)
     jax.tree.map(np.testing.assert_array_equal, again.curve, drawn.curve)
-    elsewhere = with_curves(some, MATCH_RAD, world, KEY, starts, 32)
+    elsewhere = some.with_curves(world, KEY, starts, 32)
     assert (np.asarray(elsewhere.curve.points) != np.asarray(drawn.curve.points)).any()
 
 

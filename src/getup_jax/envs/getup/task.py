@@ -17,8 +17,12 @@ from getup_jax.core.types import Engine, StepOutput, take
 from getup_jax.envs.getup import rewards, terminations, user_rewards
 from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.curriculum import assistive_wrench, regions
-from getup_jax.envs.getup.curriculum.curriculum import Curriculum, is_alone, runs_to_the_end
-from getup_jax.envs.getup.curriculum.start_sampler import Draw
+from getup_jax.envs.getup.curriculum.curriculum import (
+    Curriculum,
+    Draw,
+    is_alone,
+    runs_to_the_end,
+)
 from getup_jax.envs.getup.curriculum.state import CurriculumState
 from getup_jax.envs.getup.drawn_curves import Curve, style_curve
 from getup_jax.envs.getup.episode import EpisodeState, Record, recorded, verdict

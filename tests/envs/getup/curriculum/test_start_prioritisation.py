@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from tiny_task import changed, tiny_task
 
-from getup_jax.envs.getup.curriculum import start_prioritisation, success_rate
+from getup_jax.core.masked_update import running_mean
+from getup_jax.envs.getup.curriculum import start_prioritisation
 from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
 from getup_jax.envs.getup.resets.pool import Startable
 
@@ -88,9 +89,7 @@ def test_a_cell_moves_to_its_episodes_results_and_the_others_stay():
     cell = (jnp.asarray([0, 0, 1, 2]), jnp.asarray([0, 0, 1, 1]), jnp.asarray([3, 3, 0, 7]))
     ended = jnp.asarray([True, True, True, False])
     success = jnp.asarray([True, False, True, True])
-    after = np.asarray(
-        success_rate.update(learned, cell, ended, success, start_prioritisation.RATE)
-    )
+    after = np.asarray(running_mean(learned, cell, ended, success, start_prioritisation.RATE))
     # one episode after the other, the good one and the bad one in either order, moves as far
     assert after[0, 0, 3] == pytest.approx(0.5)
     assert after[1, 1, 0] == pytest.approx(0.5 + start_prioritisation.RATE * 0.5)

@@ -13,7 +13,6 @@ from tiny_task import CONFIG, changed, getups, neutral_prior
 from getup_jax.config import ConfigError
 from getup_jax.envs.getup import terminations
 from getup_jax.envs.getup.build import assemble
-from getup_jax.envs.getup.curriculum import start_sampler
 from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
 from getup_jax.envs.getup.resets import lying_bodies as limp
 from getup_jax.envs.getup.resets import region_pool
@@ -113,10 +112,10 @@ def test_every_region_has_starts_along_the_clip_if_asked(character, site, cache)
         np.testing.assert_allclose(qpos[:, 7:], flat[:, 7:], atol=1e-6)
     state = built.environment.init(built.world, jax.random.PRNGKey(0), 512)
     state = state.curriculum.regions.replace(opened=jnp.asarray(4, jnp.int32))
-    aids, stand = config.training_aids, config.task.stand_start
-    kind, region = start_sampler._places(aids, stand, jax.random.PRNGKey(0), 2000, state)
+    aids = built.environment.curriculum
+    kind, region = aids._places(jax.random.PRNGKey(0), 2000, state)
     share = np.asarray(kind == CLIP)[np.asarray(region) > 0].mean()
-    assert share == pytest.approx(aids.reference_start, abs=0.04)
+    assert share == pytest.approx(aids.config.reference_start, abs=0.04)
 
 
 def test_a_style_that_nothing_fits_is_left_out_of_the_region(uneven, site, cache, monkeypatch):

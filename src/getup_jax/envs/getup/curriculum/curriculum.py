@@ -7,23 +7,46 @@ assistive wrench or are cut short, and which regions are open, is decided here.
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
 
 from getup_jax.config import CurriculumConfig, TerrainConfig
+from getup_jax.core.masked_update import running_mean
 from getup_jax.core.types import StepOutput
 from getup_jax.envs.getup.curriculum import (
     assistive_wrench,
     regions,
     start_prioritisation,
-    start_sampler,
-    success_rate,
 )
-from getup_jax.envs.getup.curriculum.start_sampler import Draw, StartWorld
 from getup_jax.envs.getup.curriculum.state import CurriculumState
-from getup_jax.envs.getup.episode import LYING, EpisodeState, stands
+from getup_jax.envs.getup.drawn_curves import Curve, Library, draw_curves
+from getup_jax.envs.getup.episode import CLIP, LYING, STANDING, EpisodeState, stands
 from getup_jax.envs.getup.resets.pool import Pool
+
+_CURVES = 99  # folded into a key that is also split: none of its parts, which are 0, 1, 2, ...
+
+
+class Draw(NamedTuple):
+    """What B episodes start from."""
+
+    getup: jax.Array  # [B] int32
+    kind: jax.Array  # [B] int32
+    row: jax.Array  # [B] int32, of the pool
+    region: jax.Array | None = None  # [B] int32; None on a flat plane
+    lasts: jax.Array | None = None  # [B] s at most, inf: to the end; None: all of them are
+    assisted: jax.Array | None = None  # [B] bool, with the assistive wrench; None: there is none
+    curve: Curve | None = None  # None: those of the styles
+
+
+class StartWorld(Library, Protocol):
+    """The part of the task's world that draws need."""
+
+    @property
+    def pool(self) -> Pool:
+        """The start states."""
+        ...
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,15 +70,47 @@ class Curriculum:
         return CurriculumState(success, wrench, opened)
 
     def draw(self, world: StartWorld, state: CurriculumState, key: jax.Array, size: int) -> Draw:
-        """What `size` episodes start from, on the curves of their styles; see `with_curves`."""
-        return start_sampler.draw_starts(self.config, self.stand_start, world, key, size, state)
+        """What B = size episodes start from: even draws where the state has no success rates.
+
+        Starts with the assistive wrench are drawn where it is about to let go. The curves are those
+        of the styles, see `with_curves`.
+        """
+        config = self.config
+        key_place, key_style, key_row, key_short, key_help = jax.random.split(key, 5)
+        kind, region = self._places(key_place, size, state.regions)
+        lasts = assisted = None
+        if config.short_share > 0:
+            chance = jax.random.uniform(key_short, (size,))
+            short = (chance < config.short_share) & (kind != STANDING)
+            lasts = jnp.where(short, config.short_s, jnp.inf)
+        if state.success is None:
+            getup, row = _evenly(world.pool, region, key_style, key_row, size)
+            return Draw(getup, kind, row, region, lasts)
+        place = start_prioritisation.place_of(world.pool, kind, region)
+        getup, row = self._at_frontier(world, state.success, place, key_row)
+        if config.assistive_wrench > 0:
+            chance = jax.random.uniform(key_help, (size,))
+            assisted = (chance < config.assisted_share) & (kind != STANDING)
+        if assisted is not None and state.wrench is not None:
+            with_wrench = self._at_frontier(world, 1.0 - state.wrench, place, key_row)
+            getup = jnp.where(assisted, with_wrench[0], getup)
+            row = jnp.where(assisted, with_wrench[1], row)
+        return Draw(getup, kind, row, region, lasts, assisted)
 
     def with_curves(
-        self, world: StartWorld, key: jax.Array, drawn: Draw, first: jax.Array | int = 0
+        self, world: Library, key: jax.Array, drawn: Draw, first: jax.Array | int = 0
     ) -> Draw:
-        """The starts with the share of drawn curves that is asked for."""
-        match_rad = self.curve_match_rad
-        return start_sampler.with_curves(self.config, match_rad, world, key, drawn, first)
+        """The starts with the share of drawn curves that is asked for.
+
+        key is that of the starts, and `first` the number of their first one in the batch: so the
+        starts do not depend on the setting, and curves cost only as many rows as begin.
+        """
+        if self.config.drawn_curves == 0:
+            return drawn
+        key_curve = jax.random.fold_in(jax.random.fold_in(key, _CURVES), first)
+        match_rad, style, kind = self.curve_match_rad, drawn.getup, drawn.kind
+        curve = draw_curves(self.config, match_rad, world, key_curve, style, kind)
+        return drawn._replace(curve=curve)
 
     def prepared(
         self, pool: Pool, state: CurriculumState, drawn: Draw, begun: EpisodeState
@@ -79,7 +134,7 @@ class Curriculum:
         stood = output.truncated & stands(after.record)
         ended, alone = output.done & runs_to_the_end(after), is_alone(after)
         rate = start_prioritisation.RATE
-        success = success_rate.update(state.success, cell, ended & alone, stood, rate)
+        success = running_mean(state.success, cell, ended & alone, stood, rate)
         wrench = state.wrench
         if wrench is not None:
             wrench = assistive_wrench.update(wrench, cell, ended & ~alone, stood)
@@ -91,6 +146,36 @@ class Curriculum:
         place = start_prioritisation.place_of(pool, episode.kind, episode.region)
         return place, episode.getup, start_prioritisation.bin_of(begin)
 
+    def _at_frontier(
+        self, world: StartWorld, learned: jax.Array, place: jax.Array, key: jax.Array
+    ) -> tuple[jax.Array, jax.Array]:
+        """Styles [B] and rows [B] at the places [B], most of them where success is at stake."""
+        weight = start_prioritisation.weights(
+            learned,
+            world.pool,
+            world.duration,
+            self.config.prioritisation,
+            self.config.even_styles,
+            self.config.reference_everywhere,
+        )
+        return start_prioritisation.draw(weight, place, key)
+
+    def _places(
+        self, key: jax.Array, size: int, progress: regions.RegionProgress | None
+    ) -> tuple[jax.Array, jax.Array | None]:
+        """Kinds of start [B] and regions [B], None on a flat plane."""
+        key_kind, key_region = jax.random.split(key)
+        draw = jax.random.uniform(key_kind, (size,))
+        stand, along = self.stand_start, self.config.reference_start
+        kind = jnp.where(draw < stand, STANDING, jnp.where(draw < stand + along, CLIP, LYING))
+        kind = kind.astype(jnp.int32)
+        if progress is None:
+            return kind, None
+        region = regions.draw_region(progress, key_region, size, self.config.prioritisation)
+        if not self.config.reference_everywhere:
+            kind = jnp.where((region > 0) & (kind == CLIP), LYING, kind)
+        return kind, region
+
     def _regions(
         self, state: CurriculumState, after: EpisodeState, output: StepOutput
     ) -> tuple[regions.RegionProgress | None, StepOutput]:
@@ -101,6 +186,19 @@ class Curriculum:
         progress = regions.advance(state.regions, self.terrain, ended, ended & stood, after.region)
         opened = jnp.full(len(ended), progress.opened, jnp.float32)
         return progress, output.replace(metrics=output.metrics | {"regions_open": opened})
+
+
+def _evenly(
+    pool: Pool, region: jax.Array | None, key_style: jax.Array, key_row: jax.Array, size: int
+) -> tuple[jax.Array, jax.Array]:
+    """Styles [B] and rows [B], each as often; styles that can start in the regions [B]."""
+    *_, num_styles, rows = pool.table.shape
+    if region is None or pool.startable is None:
+        getup = jax.random.randint(key_style, (size,), 0, num_styles)
+    else:
+        place = jax.random.randint(key_style, (size,), 0, pool.startable.count[region])
+        getup = pool.startable.styles[region, place]
+    return getup, jax.random.randint(key_row, (size,), 0, rows)
 
 
 def runs_to_the_end(episode: EpisodeState) -> jax.Array:

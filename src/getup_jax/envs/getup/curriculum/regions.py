@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from getup_jax.config import TerrainConfig
-from getup_jax.envs.getup.curriculum import success_rate
+from getup_jax.core.masked_update import running_mean
 from getup_jax.physics.terrain_map import REGIONS
 
 _RATE = 0.01  # share of an episode's result in its region's running success
@@ -61,7 +61,7 @@ def advance(
     else:
         opened = state.opened
     successes = jnp.where(opened > state.opened, 0, successes)
-    rate = success_rate.update(state.rate, (region,), ended, success, _RATE)
+    rate = running_mean(state.rate, (region,), ended, success, _RATE)
     return RegionProgress(opened=opened, successes=successes, steps=steps, rate=rate)
 
 
