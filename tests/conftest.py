@@ -6,6 +6,9 @@ code generator; `XLA_FLAGS= make test` runs what users run.
 
 import os
 import sys
+from collections.abc import Iterator
+
+import pytest
 
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 if os.environ["JAX_PLATFORMS"] == "cpu":
@@ -13,3 +16,20 @@ if os.environ["JAX_PLATFORMS"] == "cpu":
     os.environ.setdefault("XLA_FLAGS", quick)
 if sys.platform == "linux" and "DISPLAY" not in os.environ:
     os.environ.setdefault("MUJOCO_GL", "egl")
+
+_MANY = 10_000  # memory maps of a process; every compiled program has some
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _forgets() -> Iterator[None]:
+    """Compiled programs are dropped after a file where they have become many.
+
+    A process keeps those of all its files otherwise, 7 GB of them in the end.
+    """
+    yield
+    maps = "/proc/self/maps"
+    if os.path.exists(maps) and "jax" in sys.modules:
+        with open(maps, encoding="utf-8") as lines:
+            many = sum(1 for _ in lines) > _MANY
+        if many:
+            sys.modules["jax"].clear_caches()

@@ -71,3 +71,19 @@ def test_masked_mean_by_hand():
     x = jnp.asarray([1.0, jnp.nan, 5.0])
     assert_allclose(masked_mean(x, jnp.asarray([True, False, True])), 3.0)
     assert np.isnan(masked_mean(x, jnp.zeros(3, bool)))
+
+
+def test_an_environment_of_other_shapes_is_told_as_it_is_traced():
+    class Odd(Probe):
+        def step(self, world, state, action):
+            after, output = super().step(world, state, action)
+            return after, output.replace(metrics={"one": jnp.zeros(())})
+
+    world, key = make_world(), jax.random.PRNGKey(0)
+    state = Odd().init(world, key, 4)
+
+    def policy(observation, key_action):
+        return jnp.zeros((4, Odd().action_size)), jnp.zeros(4)
+
+    with pytest.raises(AssertionError, match="assert_shape failed"):
+        rollout(Odd(), world, state, policy, key, 2)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
+import chex
 import jax
 import jax.numpy as jnp
 from flax import struct
@@ -119,6 +120,27 @@ class StepOutput:
         terms = {f"reward_{name}": value for name, value in self.terms.items()}
         ended = {f"ended_{name}": x.astype(jnp.float32) for name, x in self.ended.items()}
         return terms | ended | self.metrics
+
+
+def check_output(env: Environment, action: jax.Array, output: StepOutput) -> None:
+    """Raise AssertionError, as the step is traced, where an array is not as `StepOutput` says."""
+    size, rows = action.shape[0], (action.shape[0],)
+    chex.assert_shape(action, (size, env.action_size))
+    seen = [output.observation, output.final_observation]
+    chex.assert_shape(seen, (size, env.observation_size))
+    chex.assert_shape(output.reward, (size, None))
+    chex.assert_shape([output.terminated, output.truncated], rows)
+    chex.assert_type([output.terminated, output.truncated, *output.ended.values()], bool)
+    parts = (output.terms, output.ended, output.metrics, output.episode)
+    chex.assert_shape([value for part in parts for value in part.values()], rows)
+
+
+def check_control(state: PhysicsState, ctrl: jax.Array, wrench: jax.Array | None) -> None:
+    """Raise AssertionError, as it is traced, where a command does not fit the simulations."""
+    size, positions = state.kinematics.qpos.shape
+    chex.assert_shape(ctrl, (size, positions - 7))
+    if wrench is not None:
+        chex.assert_shape(wrench, (size, 6))
 
 
 class Environment(Protocol):

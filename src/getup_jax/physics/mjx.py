@@ -18,7 +18,7 @@ from flax import struct
 from mujoco import mjx
 
 from getup_jax.config import ConfigError, PhysicsConfig
-from getup_jax.core.types import Kinematics, PhysicsState, PropCommand
+from getup_jax.core.types import Kinematics, PhysicsState, PropCommand, check_control
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.props import with_balls
 
@@ -80,6 +80,7 @@ class MjxEngine:
         wrench: jax.Array | None = None,
     ) -> PhysicsState:
         """See `Engine.step`."""
+        check_control(state, ctrl, wrench)
         ctrl = jnp.nan_to_num(ctrl)
         if balls is not None:
             state = state.replace(engine=self._put_balls(state.engine, balls))

@@ -22,7 +22,7 @@ from jax.experimental.buffer_callback import buffer_callback
 from mujoco.batch import Batch, SimulationError
 
 from getup_jax.config import PhysicsConfig
-from getup_jax.core.types import Kinematics, PhysicsState, PropCommand
+from getup_jax.core.types import Kinematics, PhysicsState, PropCommand, check_control
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.props import with_balls
 
@@ -85,6 +85,7 @@ class NativeEngine:
         wrench: jax.Array | None = None,
     ) -> PhysicsState:
         """See `Engine.step`."""
+        check_control(state, ctrl, wrench)
         batch = self._batch(ctrl.shape[0])
         call = buffer_callback(batch.step, batch.result_shapes, vmap_method=None)
         command = () if balls is None else (balls.mask, balls.position, balls.velocity)

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
+import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -53,6 +54,8 @@ def decode(prior: PosePrior, latent: jax.Array, condition: jax.Array) -> jax.Arr
 
     Not clipped to the joint limits: the task limits its targets after it has added the offsets.
     """
+    chex.assert_axis_dimension(latent, -1, prior.latent_size)
+    chex.assert_axis_dimension(condition, -1, CONDITION_SIZE)
     angles: Any = network(prior).apply(prior.variables, latent, condition, method="decode")
     return angles
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import chex
 import jax
 import jax.numpy as jnp
 
@@ -37,6 +38,8 @@ def gae(
     Returns:
         advantage and target, both like reward.
     """
+    chex.assert_equal_shape([reward, value, next_value])
+    chex.assert_shape([terminated, truncated], reward.shape[:2])
     per_objective = terminated.shape + (1,) * (reward.ndim - terminated.ndim)
     ended = jnp.reshape(terminated | truncated, per_objective)
     bootstrap = jnp.where(jnp.reshape(terminated, per_objective), 0.0, next_value)

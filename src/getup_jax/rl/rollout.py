@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
-from getup_jax.core.types import Environment, StepOutput
+from getup_jax.core.types import Environment, StepOutput, check_output
 
 # (observation [B, O], key) -> (action [B, A], log_prob [B])
 Policy = Callable[[jax.Array, jax.Array], tuple[jax.Array, jax.Array]]
@@ -47,6 +47,7 @@ def rollout(
     def act_and_step(environment: Any, key_step: jax.Array):
         action, log_prob = policy(environment.observation, key_step)
         following, output = env.step(world, environment, action)
+        check_output(env, action, output)
         transition = _transition(environment.observation, action, log_prob, output)
         return following, (transition, output.logged, output.episode)
 
