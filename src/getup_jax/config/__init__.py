@@ -41,7 +41,7 @@ __all__ = [
 class Config:
     """One run. `getup-train FILE section.key=value ...` overrides any of it."""
 
-    seed: int = number(0, least=0, most=LAST_SEED)
+    seed: int = number(0, least=0, most=LAST_SEED)  # of everything that is drawn
     physics: PhysicsConfig = field(default_factory=PhysicsConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
     # None: no pose prior, the action is the servo target and no offset is unnatural

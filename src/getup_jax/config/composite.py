@@ -44,7 +44,8 @@ class GroupConfig:
 class DiscriminatorConfig:
     """One ensemble a group: a GRU over the window, dense layers, many heads [C 4.2]."""
 
-    gru_size: int = number(256, least=1, most=4096)
+    gru_size: int = number(256, least=1, most=4096)  # of the GRU over the frames
+    # of the dense layers behind it
     hidden_sizes: tuple[int, ...] = number((256, 128), least=1, most=4096, length=(0, 8))
     heads: int = number(32, least=1, most=1024)  # N of equation 2
     gradient_penalty: float = number(10.0, least=0, most=10_000)  # lambda of equation 2
@@ -53,8 +54,8 @@ class DiscriminatorConfig:
     penalty_of: str = "sum"
     # that norm; less than 1: the score still tells apart what is far from the clips
     gradient_norm: float = number(1.0, above=0, most=1000)
-    learning_rate: float = number(1e-5, above=0, most=1)
-    minibatch_size: int = number(256, least=1, most=MOST_SAMPLES)
+    learning_rate: float = number(1e-5, above=0, most=1)  # of Adam
+    minibatch_size: int = number(256, least=1, most=MOST_SAMPLES)  # windows of an update
     # of a rollout's windows that an update learns from, drawn at random
     share: float = number(1.0, above=0, most=1)
     # features (m, and numbers of quaternions) that vary by less are not blown up to a std of 1:
@@ -90,7 +91,7 @@ class CompositeConfig:
     # before training, the actor learns by regression what comes next in the clips, over a meta
     # policy in those that are new; only where training starts from a fresh policy
     warm_start: bool = False
-    episode_s: float = number(10.0, above=0, most=3600)
+    episode_s: float = number(10.0, above=0, most=3600)  # of every episode that does not fail
     # of every objective in the step that ends an episode early
     end_reward: float = number(-1.0, least=-1000, most=1000)
     # a joint centre below it, but for the feet's, is a fall

@@ -54,6 +54,7 @@ class CurriculumConfig:
     # weight of another objective with a critic of its own, beside 1 of the task's: tracking alone,
     # with a sharpness of its own; 0: off
     track_weight: float = number(0.0, least=0, most=1000)
+    # exponent on the height and orientation terms in it
     track_sharpness: float = number(3.0, above=0, most=100)
 
     def __post_init__(self) -> None:

@@ -13,6 +13,7 @@ from getup_jax.config.ranges import MOST_SAMPLES, check_numbers, number
 class NetworkConfig:
     """Actor and critic: separate multilayer perceptrons."""
 
+    # of the dense layers of either
     hidden_sizes: tuple[int, ...] = number((256, 256), least=1, most=4096, length=(0, 8))
     activation: str = "relu"  # relu | tanh | elu | silu | relu6
     # what is done in the mirror image of a state is the mirror image of what is done in the state,
@@ -40,14 +41,15 @@ class PPOConfig:
     num_envs: int = number(512, least=1, most=131_072)  # B
     num_steps: int = number(64, least=1, most=65_536)  # T
     epochs: int = number(4, least=1, most=1000)  # of the actor
-    critic_epochs: int = number(4, least=1, most=1000)
-    minibatch_size: int = number(2048, least=1, most=MOST_SAMPLES)
-    discount: float = number(0.99, least=0, below=1)
-    gae_lambda: float = number(0.95, least=0, most=1)
-    clip: float = number(0.2, above=0, most=10)
+    critic_epochs: int = number(4, least=1, most=1000)  # passes of the critic over a rollout
+    minibatch_size: int = number(2048, least=1, most=MOST_SAMPLES)  # samples of an update
+    discount: float = number(0.99, least=0, below=1)  # gamma, a control step
+    gae_lambda: float = number(0.95, least=0, most=1)  # of generalised advantage estimation
+    clip: float = number(0.2, above=0, most=10)  # epsilon: how far the probability ratio may move
+    # weight of the entropy in the loss
     entropy_coefficient: float = number(0.0, least=0, most=10)
     max_gradient_norm: float = number(0.5, above=0, most=1e6)  # of the actor
-    critic_gradient_norm: float = number(0.5, above=0, most=1e6)
+    critic_gradient_norm: float = number(0.5, above=0, most=1e6)  # of the critic
     # of the actor, first and last stage
     learning_rate: tuple[float, ...] = number((1e-4, 2e-5), least=0, most=1, length=2)
     # first and last stage
@@ -62,7 +64,7 @@ class PPOConfig:
     target_clip_fraction: float | None = number(None, above=0, below=1)
     # iterations that leave the actor alone, after `train.init_from`
     critic_first: int = number(0, least=0, most=1_000_000)
-    normalize_observation: bool = True
+    normalize_observation: bool = True  # by running mean and variance
     popart: bool = False  # normalise the value targets of every objective
 
     def __post_init__(self) -> None:

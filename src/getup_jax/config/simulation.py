@@ -123,23 +123,24 @@ class PriorConfig:
     """The conditional pose VAE."""
 
     conditional: bool = True  # False: the standard pose VAE, for the ablation
-    latent_size: int = number(16, least=1, most=1024)
+    latent_size: int = number(16, least=1, most=1024)  # Z
+    # of encoder and decoder
     hidden_sizes: tuple[int, ...] = number((256, 256), least=1, most=4096, length=(0, 8))
     mirror: bool = True  # equivariant: the image of a latent decodes to the image of its pose
     beta: float = number(1e-6, least=0, most=1000)  # weight of the KL term
-    learning_rate: float = number(1e-4, above=0, most=1)
+    learning_rate: float = number(1e-4, above=0, most=1)  # of AdamW, at first
     # share of it at the end, reached along a half cosine; 1: constant
     last_rate: float = number(1.0, least=0, most=1)
     # AdamW's, decoupled from the gradient; 0: Adam
     weight_decay: float = number(0.0, least=0, most=10)
     # on the encoder's input, in standard deviations of each hinge
     input_noise: float = number(0.0, least=0, most=10)
-    epochs: int = number(100, least=1, most=1_000_000)
-    batch_size: int = number(128, least=1, most=1_000_000)
+    epochs: int = number(100, least=1, most=1_000_000)  # passes over the poses
+    batch_size: int = number(128, least=1, most=1_000_000)  # poses of an update
     # small pose sets get more epochs, until this many updates
     min_updates: int = number(20_000, least=0, most=100_000_000)
     holdout: float = number(0.1, above=0, below=1)  # share of the poses kept for the report
-    seed: int = number(0, least=0, most=LAST_SEED)
+    seed: int = number(0, least=0, most=LAST_SEED)  # of weights, noise and order
 
     def __post_init__(self) -> None:
         check_numbers(self, "prior")
