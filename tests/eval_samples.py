@@ -35,7 +35,7 @@ def make_policy(task: BuiltTask, config: Config = SMALL) -> tuple[Learner, Polic
     learner = make_learner(
         task.environment, config.network, config.ppo, total_steps=config.train.total_steps
     )
-    return learner, learner.init_learner(jax.random.PRNGKey(0)).policy
+    return learner, jax.jit(learner.init_learner)(jax.random.PRNGKey(0)).policy
 
 
 def run(task: BuiltTask, conditions: Scenario, number: int) -> Episodes:

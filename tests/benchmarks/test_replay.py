@@ -43,7 +43,7 @@ def learner_and_world():
 @pytest.fixture(scope="module")
 def script(learner_and_world):
     learner, world = learner_and_world
-    state = learner.init(world, jax.random.PRNGKey(0))
+    state = jax.jit(learner.init)(world, jax.random.PRNGKey(0))
     return make_script(
         engine_of(learner.env),
         SIZE,
@@ -112,7 +112,7 @@ def test_balls_are_put_where_the_engine_puts_them():
 def test_an_engine_of_jax_is_recorded_and_scanned(learner_and_world):
     """Any engine is one of JAX as far as the scan can see."""
     learner, world = learner_and_world
-    state = learner.init(world, jax.random.PRNGKey(0))
+    state = jax.jit(learner.init)(world, jax.random.PRNGKey(0))
     recorded = recorded_of(learner.env)
     recording = dataclasses.replace(learner, env=recorded)
     collected = jax.jit(recording.collect)(world, state)

@@ -113,7 +113,7 @@ def test_an_action_that_means_the_same_leaves_the_policy_alone(task):
     learner, policy = make_policy(task, CONFIG)
     log: list[str] = []
     teacher = teacher_of(learner, policy, learner.env.decoder(task.world))
-    own = learner.init_learner(jax.random.PRNGKey(1)).policy
+    own = jax.jit(learner.init_learner)(jax.random.PRNGKey(1)).policy
     assert carry_over(learner, task.world, own, teacher, KEY, log.append) is policy
     assert log == []
 

@@ -78,7 +78,7 @@ def test_the_root_is_always_where_it_is(built):
 def test_a_meta_policy_acts_as_if_the_arm_were_its_own(built, arm, tmp_path, monkeypatch):
     monkeypatch.setattr("getup_jax.envs.composite.meta.chain.load_clips", lambda *_: built.clips)
     trained = make_learner(built.environment, CONFIG.network, CONFIG.ppo, total_steps=1000)
-    item = {"policy": trained.init_learner(jax.random.PRNGKey(5)).policy, "prior": None}
+    item = {"policy": jax.jit(trained.init_learner)(jax.random.PRNGKey(5)).policy, "prior": None}
     meta = str(save_learner(tmp_path / "checkpoints", 1, {"none": np.zeros(1)}, CONFIG, item))
     groups = dict(COMPOSITE.groups)
     groups["upper"] = dataclasses.replace(groups["upper"], clips=("aim",))

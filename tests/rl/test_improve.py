@@ -46,7 +46,7 @@ def _same(one, other) -> bool:
 
 
 def test_actor_and_critic_leave_each_other_alone(improver: Improver):
-    learner = LEARNER.init_learner(jax.random.key(0))
+    learner = jax.jit(LEARNER.init_learner)(jax.random.key(0))
     samples, rate, key = _samples(learner, 0.0), jnp.asarray(1e-2), jax.random.key(1)
     acted, _ = improver.actor(learner, samples, rate, STD, key)
     assert _same(acted.critic, learner.critic)
@@ -60,7 +60,7 @@ def test_actor_and_critic_leave_each_other_alone(improver: Improver):
 
 
 def test_each_has_its_number_of_epochs(improver: Improver):
-    learner = LEARNER.init_learner(jax.random.key(0))
+    learner = jax.jit(LEARNER.init_learner)(jax.random.key(0))
     samples, rate, key = _samples(learner, 0.0), jnp.asarray(1e-3), jax.random.key(1)
     acted, _ = improver.actor(learner, samples, rate, STD, key)
     valued, _ = improver.critic(learner, samples, rate, key)
@@ -79,7 +79,7 @@ def test_cosine_by_hand():
 
 
 def test_the_gradients_cosine_tells_signal_from_noise(improver: Improver):
-    learner = LEARNER.init_learner(jax.random.key(0))
+    learner = jax.jit(LEARNER.init_learner)(jax.random.key(0))
     actor = learner.policy.actor
     clear = improver.gradient_cosine(actor, _samples(learner, 0.0), STD)
     assert float(clear) > 0.9

@@ -69,7 +69,7 @@ def _share_that_stays(critic_rate: float, num_steps: int) -> float:
     )
     learner = make_learner(Stay(), NetworkConfig(hidden_sizes=(8,)), config, 100_000)
     iterate = jax.jit(learner.iteration)
-    state = learner.init(None, jax.random.key(0))
+    state = jax.jit(learner.init)(None, jax.random.key(0))
     for _ in range(100):
         state, _ = iterate(None, state)
     mean = float(learner.act(state.learner.policy, jnp.ones((1, 1)))[0, 0])

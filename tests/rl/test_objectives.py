@@ -86,7 +86,7 @@ def judged(built):
 
     def run(key):
         states = objectives.init(key)
-        env_state = env.init(world, key, 8)
+        env_state = jax.jit(env.init, static_argnums=2)(world, key, 8)
 
         def step(state, _):
             state, output = env.step(world, state, jnp.full((8, 28), 0.05))

@@ -25,6 +25,7 @@ SMALL = [
     "composite.discriminator.hidden_sizes=[8]",
     "composite.discriminator.minibatch_size=16",
     "composite.episode_s=1.0",
+    "composite.warm_start=false",  # has tests of its own, and takes a minute
     "ppo.num_envs=8",
     "ppo.num_steps=4",
     "ppo.minibatch_size=16",

@@ -96,7 +96,7 @@ def test_the_search_follows_a_curve_more_closely_than_a_policy_that_knows_nothin
 def test_the_bound_of_edits(built):
     network = NetworkConfig(hidden_sizes=(8,))
     learner = make_learner(built.environment, network, PPOConfig(), total_steps=1000)
-    policy = learner.init_learner(jax.random.PRNGKey(0)).policy
+    policy = jax.jit(learner.init_learner)(jax.random.PRNGKey(0)).policy
     seen: list[float] = []
     found = bound(built, learner, policy, edit_plan(built, 1, seed=0), seen.append)
     assert seen == [1, 2, 3, 4]

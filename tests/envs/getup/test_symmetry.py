@@ -159,7 +159,7 @@ def test_a_state_and_its_image_stay_images_under_the_policy(task, learner):
     first = jnp.stack([action, found.action(action)])
     state = state.replace(physics=env.engine.place(qpos, 0.3 * qvel), action=first)
     state, _ = jax.jit(env.advance)(world, state, first)  # now it is observed
-    policy = learner.init_learner(jax.random.PRNGKey(0)).policy
+    policy = jax.jit(learner.init_learner)(jax.random.PRNGKey(0)).policy
     # the first actions are nearly zero
     actor = jax.tree.map(lambda x: 3.0 * x, policy.actor)
     policy = dataclasses.replace(policy, actor=actor)

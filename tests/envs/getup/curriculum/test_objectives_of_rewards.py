@@ -68,7 +68,7 @@ def test_the_learner_has_a_critic_each_with_the_weights_that_are_set(sharp, monk
     monkeypatch.setattr(run, "build_task", lambda config, log: sharp)
     job = run.build_job(SHARP, lambda text: None)
     np.testing.assert_allclose(job.learner.weights, (2 / 3, 1 / 3))
-    state = job.learner.init(job.world, jax.random.PRNGKey(0))
+    state = jax.jit(job.learner.init)(job.world, jax.random.PRNGKey(0))
     value = job.learner.value(state.learner, state.environment.observation)
     assert value.shape == (8, 2)
     _, metrics = jax.jit(job.learner.iteration)(job.world, state)

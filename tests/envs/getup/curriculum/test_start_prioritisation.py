@@ -101,7 +101,7 @@ def test_the_task_follows_the_success_of_its_starts(character):
     config = changed(prioritisation=0.9)
     built = tiny_task(character, config)
     env, world = built.environment, built.world
-    state = env.init(world, jax.random.PRNGKey(0), 8)
+    state = jax.jit(env.init, static_argnums=2)(world, jax.random.PRNGKey(0), 8)
     assert state.curriculum.success.shape == (3, 2, start_prioritisation.BINS)
     ends = state.duration + config.task.stand_time_s
     learned = state.curriculum.replace(success=state.curriculum.success + 0.5)
@@ -138,7 +138,7 @@ def test_short_episodes_end_early_and_say_nothing_about_success(character):
     config = changed(prioritisation=0.9, short_share=0.999, short_s=0.3)
     built = tiny_task(character, config)
     env, world = built.environment, built.world
-    state = env.init(world, jax.random.PRNGKey(0), 8)
+    state = jax.jit(env.init, static_argnums=2)(world, jax.random.PRNGKey(0), 8)
     short = np.asarray(jnp.isfinite(state.until))
     np.testing.assert_array_equal(short, np.asarray(state.kind) != STANDING)
     assert short.any()
