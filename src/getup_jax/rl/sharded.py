@@ -55,7 +55,7 @@ class Placement:
         )
 
 
-def place(learner: Learner, world: Any, devices: Sequence[jax.Device]) -> Placement:
+def place(learner: Learner, world: Any, devices: Sequence[Any]) -> Placement:
     """The mesh of these devices, and the learner's state on it."""
     return Placement(Mesh(np.array(devices), (AXIS,)), state_specs(learner, world))
 
@@ -69,8 +69,8 @@ def state_specs(learner: Learner, world: Any) -> TrainState:
         specs = dataclasses.replace(
             specs, discriminators={n: _memory_split(s) for n, s in specs.discriminators.items()}
         )
-    environment = environment_specs(learner, world)
-    return TrainState(learner=specs, environment=environment, key=SAME, iteration=SAME)
+    same: Any = SAME
+    return TrainState(specs, environment_specs(learner, world), key=same, iteration=same)
 
 
 def environment_specs(learner: Learner, world: Any) -> Any:
