@@ -19,7 +19,7 @@ ROUNDING = 2e-5
 @pytest.fixture(scope="module")
 def found() -> dict:
     flags = os.environ.get("XLA_FLAGS", "") + " --xla_force_host_platform_device_count=4"
-    paths = [str(HERE), str(HERE.parent / "tasks"), *filter(None, sys.path)]
+    paths = [str(HERE), str(HERE.parent / "envs"), *filter(None, sys.path)]
     environment = {**os.environ, "XLA_FLAGS": flags, "PYTHONPATH": os.pathsep.join(paths)}
     command = [sys.executable, str(HERE / "spread_samples.py")]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=600)

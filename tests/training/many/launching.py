@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-PATHS = [HERE, HERE.parent / "algo"]
+PATHS = [HERE, HERE.parent.parent / "rl"]
 SETTINGS = [
     "ppo.num_envs=16",
     "ppo.num_steps=8",

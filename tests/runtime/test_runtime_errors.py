@@ -6,7 +6,7 @@ from getup_jax.runtime.runtime_errors import LOST, translate
 
 # as JAX's runtime says it, shortened
 ACCOUNT = b"""\
-E1129 12:34:15.333559   26832 coordination_service.cc:1549] Use error polling to propagate: UNAVAILABLE:
+E1129 12:34:15.333559   26832 coordination_service.cc:1549] Use error polling: UNAVAILABLE:
 1
 The tasks have crashed. Check the task logs for an earlier error
 
