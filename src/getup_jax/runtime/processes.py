@@ -37,8 +37,8 @@ def join(group: Group) -> None:
     if group.alone:
         return
     jax.config.update("jax_cpu_collectives_implementation", "gloo")
-    # SIGTERM is for the loop, see signals.py
-    jax.config.update("jax_enable_preemption_service", False)
+    with contextlib.suppress(AttributeError):  # SIGTERM is for the loop, see signals.py
+        jax.config.update("jax_enable_preemption_service", False)
     begin, given = time.monotonic(), group.coordinator is not None
     if group.coordinator is not None and group.process:
         _wait_for_coordinator(group.coordinator, group.wait_s)
@@ -85,8 +85,8 @@ def end(code: int) -> NoReturn:
 
 
 @contextlib.contextmanager
-def lost_is_an_error(resume: Callable[[], str]):
-    """While this is open, a lost process raises ProcessError with what `resume` says to do."""
+def lost_is_an_error():
+    """While this is open, another process that is lost raises ProcessError."""
     try:
         yield
     except (RuntimeError, ValueError, OSError) as error:
@@ -95,8 +95,9 @@ def lost_is_an_error(resume: Callable[[], str]):
             raise
         me = f"process {jax.process_index()} of {count()}"
         problem = " ".join(str(error).split())[:160]
+        hint = "start all of them again with --resume to go on from the last checkpoint"
         raise ProcessError(
-            f"{me}: another process of this run is gone ({problem}); {resume()}"
+            f"{me}: another process of this run is gone ({problem}); {hint}"
         ) from error
 
 

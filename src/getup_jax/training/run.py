@@ -135,7 +135,7 @@ def run(
     quiet = quiet or not processes.is_first()
     check_divides(config, jax.device_count())
     with (
-        processes.lost_is_an_error(lambda: f"continue with all\n  {resume_command(folder)}"),
+        processes.lost_is_an_error(),
         Display(total, quiet) as display,
         StopRequest(display.log) as stop,
     ):

@@ -63,11 +63,24 @@ def spread(learner: Any, world: Any, state: Any) -> tuple[Iteration, Any, Any]:
     devices = jax.devices()
     if len(devices) == 1:
         return learner.iteration, world, state
+    _check_shapes(world)
     world = processes.from_first(world)
     state = state.replace(learner=processes.from_first(state.learner))
     placement = place(learner, world, devices)
     iteration = placement.spread(learner.iteration)
     return iteration, placement.put_world(world), placement.put_state(state)
+
+
+def _check_shapes(world: Any) -> None:
+    """Raise ProcessError in all unless all have built arrays of the same shapes."""
+    shapes = str(jax.tree.map(lambda x: (jax.numpy.shape(x), str(x.dtype)), world))
+    found = processes.gathered([zlib.crc32(shapes.encode())])[:, 0]
+    for index in range(1, len(found)):
+        if found[index] != found[0]:
+            hint = "machines round differently; give all one cache folder, with XDG_CACHE_HOME"
+            raise ProcessError(
+                f"process {index} has made other start states than process 0: {hint}"
+            )
 
 
 def described() -> str:

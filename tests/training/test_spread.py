@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from getup_jax.config import CompositeConfig, Config, ConfigError, DiscriminatorConfig, PPOConfig
+from getup_jax.runtime import processes
+from getup_jax.runtime.processes import ProcessError
+from getup_jax.runtime.run_folder import RunError, prepare
+from getup_jax.training import spread
+
+CONFIG = Config(ppo=PPOConfig(num_envs=12, num_steps=4, minibatch_size=24))
+
+
+def composite(minibatch_size: int, memory: int) -> Config:
+    judge = DiscriminatorConfig(minibatch_size=minibatch_size, memory=memory)
+    return dataclasses.replace(CONFIG, composite=CompositeConfig(discriminator=judge))
+
+
+@pytest.mark.parametrize("devices", [1, 2, 3, 4, 6, 12])
+def test_what_divides_is_accepted(devices):
+    spread.check_divides(CONFIG, devices)
+
+
+@pytest.mark.parametrize(
+    ("config", "devices", "text"),
+    [
+        (CONFIG, 8, r"ppo.num_envs: expected a multiple .* 8, got 12; set ppo.num_envs=16"),
+        (CONFIG, 5, "ppo.num_envs=15"),
+        (composite(6, 0), 4, r"composite.discriminator.minibatch_size: expected .* got 6; set "),
+        (composite(12, 6), 4, r"composite.discriminator.memory: expected a multiple of .* got 6"),
+    ],
+)
+def test_what_does_not_divide_is_named(config, devices, text):
+    with pytest.raises(ConfigError, match=text):
+        spread.check_divides(config, devices)
+
+
+def as_process_1(monkeypatch, change: int) -> None:
+    """Let another process answer as this one, but for `change` of its values."""
+
+    def gathered(values):
+        other = list(values)
+        other[change] += 1
+        return np.asarray([values, other], np.int64)
+
+    monkeypatch.setattr(processes, "gathered", gathered)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "text"),
+    [
+        (0, ProcessError, "process 1 has other settings than process 0"),
+        (1, RunError, "process 1 does not see what process 0 wrote"),
+    ],
+)
+def test_processes_must_agree(monkeypatch, tmp_path, change, error, text):
+    prepare(tmp_path, CONFIG, False, print)
+    spread.check_shared(CONFIG, tmp_path)
+    as_process_1(monkeypatch, change)
+    with pytest.raises(error, match=text):
+        spread.check_shared(CONFIG, tmp_path)
+
+
+def test_processes_must_have_made_the_same(monkeypatch):
+    spread._check_shapes({"pool": np.zeros(3)})
+    as_process_1(monkeypatch, 0)
+    with pytest.raises(ProcessError, match="process 1 has made other start states"):
+        spread._check_shapes({"pool": np.zeros(3)})
