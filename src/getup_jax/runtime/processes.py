@@ -23,6 +23,7 @@ from jax.experimental import multihost_utils
 from getup_jax.runtime.process_group import Group, ProcessError, address_of
 from getup_jax.runtime.runtime_errors import translate_stderr
 
+_GRACE_S = 3.0
 _LOST = 3  # exit code of a process whose run has lost another one
 # of what JAX says where another process has gone; its own texts differ by platform
 _GONE = ("gloo", "nccl", "connection", "unavailable", "heartbeat", "deadline_exceeded", "socket")
@@ -78,7 +79,12 @@ def leave() -> None:
 
 
 def end(code: int) -> NoReturn:
-    """End this process at once; at an exit JAX would wait for the others, which may wait for it."""
+    """End this process now; at an exit JAX would wait for the others, which may wait for it.
+
+    The first one gives them a moment, since they end with it: they may have the same to say.
+    """
+    if code and count() > 1 and is_first():
+        time.sleep(_GRACE_S)
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
@@ -161,8 +167,9 @@ def _give_up(group: Group) -> None:
         f"ProcessError: not {size} processes came together{where} within {group.wait_s:g} s; start "
         "every one with the same --coordinator and --processes, and a --process of its own",
         file=sys.stderr,
+        flush=True,
     )
-    end(_LOST)
+    os._exit(_LOST)
 
 
 def _not_joined(group: Group, error: Exception) -> ProcessError:

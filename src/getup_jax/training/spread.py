@@ -77,10 +77,9 @@ def _check_shapes(world: Any) -> None:
     found = processes.gathered([zlib.crc32(shapes.encode())])[:, 0]
     for index in range(1, len(found)):
         if found[index] != found[0]:
-            hint = "machines round differently; give all one cache folder, with XDG_CACHE_HOME"
-            raise ProcessError(
-                f"process {index} has made other start states than process 0: {hint}"
-            )
+            problem = f"process {index} has made other start states than process 0"
+            hint = "machines round differently; let GETUP_JAX_CACHE name a folder that all share"
+            raise ProcessError(f"{problem}; {hint}")
 
 
 def described() -> str:
