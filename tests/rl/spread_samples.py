@@ -5,6 +5,7 @@ A process has as many devices as XLA_FLAGS says when it starts, so this is one o
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 from collections.abc import Callable
@@ -13,13 +14,15 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+import tiny_composite
 from jax.sharding import PartitionSpec
 from probes import Probe, make_world
 from tiny_task import CONFIG as TINY
 from tiny_task import tiny_task
 
-from getup_jax.config import NetworkConfig, PPOConfig
+from getup_jax.config import CurriculumConfig, NetworkConfig, PPOConfig
 from getup_jax.core import device_axis
+from getup_jax.envs.composite.discriminator_rewards import make_discriminator_rewards
 from getup_jax.physics.character import load_character
 from getup_jax.rl.learner import Learner, make_learner
 from getup_jax.rl.sharded import SPLIT, Placement, place
@@ -82,23 +85,41 @@ def _spread_learn(learner: Learner, placement: Placement, collected: Any) -> Cal
 
 
 def getup_run(number: int) -> dict[str, Any]:
-    """Two iterations of getting up on the native engine, from the same state in each part."""
-    built = tiny_task(load_character(TINY.physics))
-    config = PPOConfig(num_envs=8, num_steps=4, epochs=1, critic_epochs=1, minibatch_size=16)
-    learner = make_learner(built.environment, NETWORK, config, total_steps=10_000)
-    placement = place(learner, built.world, jax.devices()[:number])
-    state = learner.init(built.world, jax.random.PRNGKey(0))
+    """Getting up on the native engine, with the curriculum's counters."""
+    curriculum = CurriculumConfig(prioritisation=0.9, short_share=0.5, assistive_wrench=0.5)
+    config = dataclasses.replace(TINY, curriculum=curriculum)
+    built = tiny_task(load_character(config.physics), config)
+    ppo = PPOConfig(num_envs=8, num_steps=4, epochs=1, critic_epochs=1, minibatch_size=16)
+    learner = make_learner(built.environment, NETWORK, ppo, total_steps=10_000)
+    return two_iterations(learner, built.world, number)
+
+
+def composite_run(number: int) -> dict[str, Any]:
+    """Composite motion, with discriminators."""
+    config = tiny_composite.CONFIG
+    built = tiny_composite.tiny_composite(load_character(config.physics), config)
+    rewards = make_discriminator_rewards(built.environment, built.environment.config)
+    learner = make_learner(
+        built.environment, config.network, config.ppo, 10_000, reward_model=rewards
+    )
+    return two_iterations(learner, built.world, number)
+
+
+def two_iterations(learner: Learner, of_one: Any, number: int) -> dict[str, Any]:
+    """What is seen of them, from the same simulations in each device's part."""
+    placement = place(learner, of_one, jax.devices()[:number])
+    state = learner.init(of_one, jax.random.PRNGKey(0))
     state = placement.put_state(_repeated(state, placement, number))
-    world = placement.put_world(built.world)
+    world = placement.put_world(of_one)
     step = jax.jit(placement.spread(learner.iteration), donate_argnums=1)
     for _ in range(2):
         state, metrics = step(world, state)
     same = jax.tree.map(lambda x, s: None if s == SPLIT else x, state, placement.specs)
-    actions = np.asarray(state.environment.action).reshape(number, -1)
+    observations = np.asarray(state.environment.observation).reshape(number, -1)
     return {
         "finite": all(np.isfinite(np.asarray(x)).all() for x in jax.tree.leaves(state.learner)),
         "same on all": device_axis.same_on_all(same),
-        "parts differ": len(np.unique(actions, axis=0)) == number,
+        "parts differ": len(np.unique(observations, axis=0)) == number,
         "programs": step._cache_size(),
         "physics": float(metrics["rollout/ended_not_finite"]),
     }
@@ -116,5 +137,5 @@ def _repeated(state: TrainState, placement: Placement, number: int) -> TrainStat
 
 
 if __name__ == "__main__":
-    found = {"samples": same_samples(), "getup": getup_run(MESHES[-1])}
+    found = {"samples": same_samples(), "getup": getup_run(4), "composite": composite_run(2)}
     json.dump(found, sys.stdout)

@@ -35,8 +35,9 @@ def test_the_same_samples_give_the_state_of_one_device(found, devices):
     assert samples[f"metrics {devices}"] < ROUNDING
 
 
-def test_getting_up_on_four_devices(found):
-    assert found["getup"] == {
+@pytest.mark.parametrize("task", ["getup", "composite"])
+def test_tasks_on_many_devices(found, task):
+    assert found[task] == {
         "finite": True,
         "same on all": True,  # networks, statistics, counters
         "parts differ": True,  # from the same start states: every device draws its own

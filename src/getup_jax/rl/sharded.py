@@ -1,8 +1,7 @@
 """A learner's iteration on many devices: every device has a part of the simulations.
 
 One mesh with one axis spans the devices of all processes. Networks, optimisers, statistics and what
-an environment keeps of the whole batch are the same on every device; simulations, and the memory
-of discriminators, are split. The code of an iteration is that of one device: where it reduces over
+an environment keeps of the whole batch are the same on every device; simulations are split. The code of an iteration is that of one device: where it reduces over
 simulations it calls core/device_axis.py.
 """
 
@@ -62,13 +61,8 @@ def place(learner: Learner, world: Any, devices: Sequence[Any]) -> Placement:
 
 def state_specs(learner: Learner, world: Any) -> TrainState:
     """Which arrays of the learner's `TrainState` are split, along their first axis."""
-    key = jax.random.PRNGKey(0)
-    split = jax.eval_shape(learner.init_learner, key)
-    specs = jax.tree.map(lambda _: SAME, split)
-    if split.discriminators is not None:
-        specs = dataclasses.replace(
-            specs, discriminators={n: _memory_split(s) for n, s in specs.discriminators.items()}
-        )
+    shapes = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0))
+    specs = jax.tree.map(lambda _: SAME, shapes)
     same: Any = SAME
     return TrainState(specs, environment_specs(learner, world), key=same, iteration=same)
 
@@ -95,7 +89,3 @@ def put(x: Any, sharding: NamedSharding) -> jax.Array:
     """An array that this process has in full, as one over the devices of all processes."""
     whole = np.asarray(x)
     return jax.make_array_from_callback(whole.shape, sharding, lambda index: whole[index])
-
-
-def _memory_split(specs: Any) -> Any:
-    return specs if specs.memory is None else dataclasses.replace(specs, memory=SPLIT)

@@ -29,7 +29,6 @@ def check_divides(config: Config, devices: int) -> None:
     }
     if discriminator is not None:
         split["composite.discriminator.minibatch_size"] = discriminator.minibatch_size
-        split["composite.discriminator.memory"] = discriminator.memory
     for key, value in split.items():
         if value % devices:
             fewer = "or use fewer devices, as with CUDA_VISIBLE_DEVICES=0"
