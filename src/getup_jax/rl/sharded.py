@@ -1,8 +1,9 @@
 """A learner's iteration on many devices: every device has a part of the simulations.
 
 One mesh with one axis spans the devices of all processes. Networks, optimisers, statistics and what
-an environment keeps of the whole batch are the same on every device; simulations are split. The code of an iteration is that of one device: where it reduces over
-simulations it calls core/device_axis.py.
+an environment keeps of the whole batch are the same on every device; simulations are split. The
+code of an iteration is that of one device: where it reduces over simulations it calls
+core/device_axis.py.
 """
 
 from __future__ import annotations

@@ -78,7 +78,8 @@ class DiscriminatorRewards:
         if share == 1.0:
             return windows
         order = jax.random.permutation(jax.random.fold_in(key, _DRAWN), len(windows))
-        return windows[order[: round(share * len(windows))]]
+        drawn = round(share * len(windows) * device_axis.size())  # on all devices together
+        return windows[order[: device_axis.part(drawn)]]
 
     def _merged(self, rewards: jax.Array) -> jax.Array:
         """Rewards [T, B, K] as the critics have them."""
