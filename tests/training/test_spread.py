@@ -63,8 +63,16 @@ def test_processes_must_agree(monkeypatch, tmp_path, change, error, text):
         spread.check_shared(CONFIG, tmp_path)
 
 
-def test_processes_must_have_made_the_same(monkeypatch):
-    spread._check_shapes({"pool": np.zeros(3)})
-    as_process_1(monkeypatch, 0)
-    with pytest.raises(ProcessError, match="process 1 has made other start states"):
-        spread._check_shapes({"pool": np.zeros(3)})
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (0, "process 1 has made other start states than process 0"),
+        (1, "process 1 resumes at iteration 8, process 0 at 7"),
+    ],
+)
+def test_processes_must_begin_alike(monkeypatch, change, text):
+    world = {"pool": np.zeros(3)}
+    spread._check_same(world, 7)
+    as_process_1(monkeypatch, change)
+    with pytest.raises(ProcessError, match=text):
+        spread._check_same(world, 7)

@@ -97,10 +97,12 @@ def lost_is_an_error():
         yield
     except (RuntimeError, ValueError, OSError) as error:
         ours = type(error).__module__.startswith("getup_jax.")
-        if count() == 1 or ours or not any(word in str(error).lower() for word in _GONE):
+        # an error of ours may be what another one looked like, as where a checkpoint was written
+        cause = error.__cause__ if ours else error
+        if count() == 1 or not any(word in str(cause).lower() for word in _GONE):
             raise
         me = f"process {jax.process_index()} of {count()}"
-        problem = " ".join(str(error).split())[:160]
+        problem = " ".join(str(cause).split())[:160]
         hint = "start all of them again with --resume to go on from the last checkpoint"
         raise ProcessError(
             f"{me}: another process of this run is gone ({problem}); {hint}"

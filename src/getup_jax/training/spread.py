@@ -62,7 +62,7 @@ def spread(learner: Any, world: Any, state: Any) -> tuple[Iteration, Any, Any]:
     devices = jax.devices()
     if len(devices) == 1:
         return learner.iteration, world, state
-    _check_shapes(world)
+    _check_same(world, int(state.iteration))
     world = processes.from_first(world)
     state = state.replace(learner=processes.from_first(state.learner))
     placement = place(learner, world, devices)
@@ -70,15 +70,18 @@ def spread(learner: Any, world: Any, state: Any) -> tuple[Iteration, Any, Any]:
     return iteration, placement.put_world(world), placement.put_state(state)
 
 
-def _check_shapes(world: Any) -> None:
-    """Raise ProcessError in all unless all have built arrays of the same shapes."""
-    shapes = str(jax.tree.map(lambda x: (jax.numpy.shape(x), str(x.dtype)), world))
-    found = processes.gathered([zlib.crc32(shapes.encode())])[:, 0]
-    for index in range(1, len(found)):
-        if found[index] != found[0]:
+def _check_same(world: Any, iteration: int) -> None:
+    """Raise ProcessError in all unless all have built the same shapes, and resume at one place."""
+    shapes = str(jax.tree.map(lambda x: (x.shape, str(x.dtype)), world))
+    found = processes.gathered([zlib.crc32(shapes.encode()), iteration])
+    for index, (own, begin) in enumerate(found):
+        if own != found[0, 0]:
             problem = f"process {index} has made other start states than process 0"
             hint = "machines round differently; let GETUP_JAX_CACHE name a folder that all share"
             raise ProcessError(f"{problem}; {hint}")
+        if begin != found[0, 1]:
+            problem = f"process {index} resumes at iteration {begin}, process 0 at {found[0, 1]}"
+            raise ProcessError(f"{problem}; wait until all machines see the same files, try again")
 
 
 def described() -> str:
