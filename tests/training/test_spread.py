@@ -5,7 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from getup_jax.config import CompositeConfig, Config, ConfigError, DiscriminatorConfig, PPOConfig
+from getup_jax.config import (
+    CompositeConfig,
+    Config,
+    ConfigError,
+    DiscriminatorConfig,
+    GroupConfig,
+    PPOConfig,
+)
 from getup_jax.runtime import processes
 from getup_jax.runtime.processes import ProcessError
 from getup_jax.runtime.run_folder import RunError, prepare
@@ -16,7 +23,9 @@ CONFIG = Config(ppo=PPOConfig(num_envs=12, num_steps=4, minibatch_size=24))
 
 def composite(minibatch_size: int) -> Config:
     judge = DiscriminatorConfig(minibatch_size=minibatch_size)
-    return dataclasses.replace(CONFIG, composite=CompositeConfig(discriminator=judge))
+    groups = {"all": GroupConfig(links=("all",))}
+    composite = CompositeConfig(groups=groups, discriminator=judge)
+    return dataclasses.replace(CONFIG, composite=composite)
 
 
 @pytest.mark.parametrize("devices", [1, 2, 3, 4, 6, 12])

@@ -37,10 +37,16 @@ class Placement:
         return jax.tree.map(lambda x: put(x, NamedSharding(self.mesh, SAME)), world)
 
     def put_state(self, state: TrainState) -> TrainState:
-        """A whole state of this process, the same in all, spread over the devices."""
-        return jax.tree.map(
-            lambda x, spec: put(x, NamedSharding(self.mesh, spec)), state, self.specs
-        )
+        """A whole state of this process, the same in all, spread over the devices.
+
+        An array without elements lies on all of them, as XLA returns it: placed otherwise, the
+        second iteration would be another program.
+        """
+
+        def spread(x: Any, spec: PartitionSpec) -> jax.Array:
+            return put(x, NamedSharding(self.mesh, spec if np.size(x) else SAME))
+
+        return jax.tree.map(spread, state, self.specs)
 
     def spread(self, iteration: Iteration) -> Iteration:
         """The iteration of `put_world`'s and `put_state`'s arrays; jit it and donate the state."""
