@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from getup_jax import __version__
+from getup_jax.cli.process_options import add_options, group_of
 from getup_jax.config.load import find_config, load_config
 from getup_jax.editor.options import parse as parse_edit
 from getup_jax.evaluation.options import eval_parser
@@ -26,10 +27,12 @@ examples:
   getup-train flat ppo.num_envs=256 seed=1 --run runs/seed1
                                                        change settings, keep the file
   getup-train composite_wave_squat                     composite motion, see docs/composite.md
+  getup-train flat --coordinator 10.0.0.1:4711 --processes 2 --process 0
+                                                       on two machines, see docs/scale.md
 
-A run folder holds config.yaml (every setting), metrics.jsonl and times.jsonl (one line an
-iteration) and checkpoints/. Ctrl-C, SIGTERM and closing the terminal save and exit; a second Ctrl-C
-exits at once.
+All devices of the machine are used. A run folder holds config.yaml (every setting), metrics.jsonl
+and times.jsonl (one line an iteration) and checkpoints/. Ctrl-C, SIGTERM and closing the terminal
+save and exit; a second Ctrl-C exits at once.
 """
 
 
@@ -66,13 +69,23 @@ def edit_main(argv: Sequence[str] | None = None) -> int:
 def _train(args: argparse.Namespace) -> int:
     config = load_config(args.config, args.overrides)
     folder = args.run or Path("runs") / find_config(args.config).stem
-    run_folder.check(folder, args.resume)
-    if not args.quiet:
+    group = group_of(args)
+    if group.alone:
+        run_folder.check(folder, args.resume)
+    if not args.quiet and not group.process:
         print(f"getup-train {__version__}: {args.config} into {folder}", flush=True)
-    from getup_jax.training.run import run
 
-    number = run(config, folder, args.resume, args.quiet)
-    return 0 if number is None else 128 + number
+    def train() -> int:
+        from getup_jax.training.run import run
+
+        number = run(config, folder, args.resume, args.quiet)
+        return 0 if number is None else 128 + number
+
+    if group.alone:
+        return train()
+    from getup_jax.cli.many import together
+
+    return together(group, train)
 
 
 def _evaluate(args: argparse.Namespace) -> int:
@@ -151,4 +164,5 @@ def _train_parser() -> argparse.ArgumentParser:
     add("--run", type=Path, metavar="FOLDER", help="the run's folder (default: runs/NAME)")
     add("--resume", action="store_true", help="continue the run that is in the folder, if any")
     add("--quiet", action="store_true", help="print only warnings and errors")
+    add_options(parser)
     return parser

@@ -8,6 +8,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from getup_jax.core import device_axis
+
 
 def replace_rows(
     rows: Any, mask: jax.Array, compute: Callable[[jax.Array], Any], chunk: int
@@ -50,10 +52,13 @@ def running_mean(
 ) -> jax.Array:
     """The running means [...] of entries after some of B results came in: which ones, [B] bool.
 
+    On many devices the results are those of all of them.
+
     index: of the entries [B] that they count in; good [B]: 1, else 0; rate: share of a result in
     its entry's mean.
     """
-    number = jnp.zeros_like(mean).at[index].add(counts.astype(jnp.float32))
-    total = jnp.zeros_like(mean).at[index].add((counts & good).astype(jnp.float32))
+    number = device_axis.added(jnp.zeros_like(mean), index, counts.astype(jnp.float32))
+    none = jnp.zeros_like(mean)
+    total = device_axis.added(none, index, (counts & good).astype(jnp.float32))
     share = 1.0 - (1.0 - rate) ** number
     return mean + share * (total / jnp.maximum(number, 1.0) - mean)

@@ -107,6 +107,8 @@ class _HostBatch:
 
     def __init__(self, engine: NativeEngine, size: int):
         # persistent: the stage at the end of a step is not computed again by the next one
+        # devices of one process step the same batch in turn, each with all threads
+        self._turn = threading.Lock()
         self._batch = Batch(engine.model, size, min(engine._threads, size), persistent=True)
         self._substeps = engine._substeps
         self._sizes = engine._sizes
@@ -124,6 +126,10 @@ class _HostBatch:
 
         more: the three parts of a command of balls, if any, then the wrench, if any.
         """
+        with self._turn:
+            self._step(out, rows, ctrl, *more)
+
+    def _step(self, out: Any, rows: Any, ctrl: Any, *more: Any) -> None:
         self._batch.state[...] = np.asarray(rows).view(np.float64)
         balls, wrench = more[: len(more) // 3 * 3], more[len(more) // 3 * 3 :]
         if balls:

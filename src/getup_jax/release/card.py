@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from getup_jax.release import composite_card
+from getup_jax.release.engine_line import engine_table
 from getup_jax.runtime.checkpoint import LoadedPolicy
 from getup_jax.runtime.console import duration
 
@@ -68,6 +69,7 @@ def model_card(
     training = data | _training(loaded, provenance)
     numbers = composite_card.numbers if composite else _numbers
     limits = composite_card.limits() if composite else _limits(loaded, evaluations)
+    tables = ["" if composite else engine_table(evaluations), *map(numbers, evaluations)]
     if not evaluations:
         limits.append("How well it does has not been measured.")
     return _CARD.format(
@@ -76,7 +78,7 @@ def model_card(
         folder=name,
         training="\n".join(f"| {key} | {value} |" for key, value in training.items()),
         meaning=composite_card.MEANING if composite else _MEANING,
-        numbers="\n\n".join(map(numbers, evaluations)) or "Not evaluated yet.",
+        numbers="\n\n".join(filter(None, tables)) or "Not evaluated yet.",
         limits="\n".join(f"- {limit}" for limit in limits),
     )
 

@@ -114,7 +114,8 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="FILE",
-        help="results of getup-eval --json for the card; may be given several times",
+        help="results of getup-eval --json for the card; may be given several times, and of one "
+        "setting on several engines, which then stand side by side",
     )
     add("--machine", metavar="TEXT", help="what it was trained on, for the card")
     add(

@@ -13,6 +13,7 @@ from flax import linen as nn
 from flax import struct
 
 from getup_jax.config import DiscriminatorConfig
+from getup_jax.core import device_axis
 from getup_jax.networks.mlp import dense_layers
 from getup_jax.networks.recurrent import GRU
 from getup_jax.rl import normalize
@@ -87,7 +88,8 @@ class Discriminator:
             share=jax.random.uniform(key_share, fake.shape[:1]),
             head=jnp.arange(len(fake), dtype=jnp.int32),  # rows are shuffled
         )
-        rows = shuffled_minibatches(key_order, 1, len(fake), self.config.minibatch_size)
+        size = device_axis.part(self.config.minibatch_size)
+        rows = shuffled_minibatches(key_order, 1, len(fake), size)
         variables, optimiser, metrics = run_minibatches(
             self._loss, self._optimiser(), state.variables, state.optimiser, pairs, rows
         )

@@ -18,6 +18,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from getup_jax.config import NetworkConfig, PPOConfig
+from getup_jax.core import device_axis
 from getup_jax.core.types import Environment
 from getup_jax.networks import gaussian
 from getup_jax.rl import ppo, schedule, weight_average
@@ -73,18 +74,22 @@ class Learner:
     def init(self, world: Any, key: jax.Array) -> TrainState:
         """The state before the first iteration."""
         key_environment, key_learner, key_run = jax.random.split(key, 3)
-        environment = self.env.init(world, key_environment, self.config.num_envs)
-        # In lockstep, an iteration would see one phase of all episodes, and the next one another.
-        stagger = getattr(self.env, "stagger", None)
-        if stagger is not None:
-            environment = stagger(environment, jax.random.fold_in(key_environment, _STAGGER))
         state = TrainState(
             learner=self.init_learner(key_learner),
-            environment=environment,
+            environment=self.init_environment(world, key_environment, self.config.num_envs),
             key=key_run,
             iteration=jnp.zeros((), jnp.int32),
         )
         return owned(state)
+
+    def init_environment(self, world: Any, key: jax.Array, num_envs: int) -> Any:
+        """The environment's part of `init`, of any number of simulations."""
+        environment = self.env.init(world, key, num_envs)
+        # In lockstep, an iteration would see one phase of all episodes, and the next one another.
+        stagger = getattr(self.env, "stagger", None)
+        if stagger is None:
+            return environment
+        return stagger(environment, jax.random.fold_in(key, _STAGGER))
 
     def init_learner(self, key: jax.Array) -> LearnerState:
         """The learner's part of `init`; needs no world, so a checkpoint's form can be had alone."""
@@ -97,7 +102,8 @@ class Learner:
     def iteration(self, world: Any, state: TrainState) -> tuple[TrainState, dict[str, jax.Array]]:
         """One iteration: T * B new samples; metrics are float32 scalars.
 
-        Jit it once and donate the state: `jax.jit(learner.iteration, donate_argnums=1)`.
+        Jit it once and donate the state: `jax.jit(learner.iteration, donate_argnums=1)`. For
+        several devices see `sharded.py`.
         """
         return self.learn(world, state, self.collect(world, state))
 
@@ -227,8 +233,11 @@ class Learner:
 
 
 def _iteration_key(state: TrainState) -> jax.Array:
-    """Folded in, so that a run that resumes here draws what the unbroken one would have."""
-    return jax.random.fold_in(state.key, state.iteration)
+    """Folded in, so that a run that resumes here draws what the unbroken one would have.
+
+    Every device has its own.
+    """
+    return device_axis.own_key(jax.random.fold_in(state.key, state.iteration))
 
 
 def _select(mask: jax.Array, a: LearnerState, b: LearnerState) -> LearnerState:

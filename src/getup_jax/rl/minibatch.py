@@ -9,6 +9,8 @@ import jax
 import jax.numpy as jnp
 import optax
 
+from getup_jax.core import device_axis
+
 # (parameters, minibatch) -> (scalar loss, metrics)
 Loss = Callable[[Any, Any], tuple[jax.Array, dict[str, jax.Array]]]
 
@@ -59,6 +61,9 @@ def run_minibatches(
 ) -> tuple[Any, Any, dict[str, jax.Array]]:
     """One gradient step for every row of `minibatches`.
 
+    On several devices each has its own samples and a part of every minibatch; the gradient is the
+    mean over the devices, so that all make the same step.
+
     Args:
         loss: of the parameters on a minibatch, with metrics.
         optimiser: see `make_optimiser`.
@@ -76,13 +81,15 @@ def run_minibatches(
         parameters, optimiser_state = carry
         minibatch = jax.tree.map(lambda x: x[rows], samples)
         gradient, metrics = jax.grad(loss, has_aux=True)(parameters, minibatch)
+        gradient = device_axis.averaged(gradient)
         updates, optimiser_state = optimiser.update(gradient, optimiser_state, parameters)
         metrics = {**metrics, "gradient_norm": optax.tree.norm(gradient)}
         return (optax.apply_updates(parameters, updates), optimiser_state), metrics
 
     carry = (parameters, optimiser_state)
     (parameters, optimiser_state), metrics = jax.lax.scan(minibatch_update, carry, minibatches)
-    return parameters, optimiser_state, jax.tree.map(jnp.mean, metrics)
+    metrics = device_axis.averaged(jax.tree.map(jnp.mean, metrics))
+    return parameters, optimiser_state, metrics
 
 
 def adapt_scale(scale: jax.Array, clip_fraction: jax.Array, target: float | None) -> jax.Array:

@@ -21,6 +21,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from getup_jax.core import device_axis
 from getup_jax.core.mirror import SignedPermutation
 
 # In standard deviations. Beyond it a value says only that something rare happened; unclipped, one
@@ -54,14 +55,14 @@ def initial(size: int) -> Moments:
 def moments_of(x: jax.Array, near: jax.Array) -> Moments:
     """Moments of a batch x[..., O], in two passes.
 
-    `near` [O] is any guess of the mean: sums of small numbers round less. To reduce over devices,
-    `psum` the two sums and the count; `near` must then be the same on all of them, as the running
-    mean is.
+    `near` [O] is any guess of the mean: sums of small numbers round less. It must be the same on
+    all devices, as the running mean is.
     """
     axes = tuple(range(x.ndim - 1))
     count = jnp.asarray(x.size // x.shape[-1], jnp.float32)
-    offset = jnp.sum(x - near, axes) / count
-    variance = jnp.sum(jnp.square(x - near - offset), axes) / count
+    offset = device_axis.averaged(jnp.sum(x - near, axes) / count)
+    variance = device_axis.averaged(jnp.sum(jnp.square(x - near - offset), axes) / count)
+    count = device_axis.summed(count)
     mean, residue = _add(near, offset)
     return Moments(count=count, mean=mean, residue=residue, variance=variance)
 

@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 
 from getup_jax.config import PPOConfig
+from getup_jax.core import device_axis
 from getup_jax.rl import ppo
 from getup_jax.rl.actor_critic import ActorCritic
 from getup_jax.rl.minibatch import (
@@ -111,13 +112,14 @@ class Improver:
         """
 
         def gradient(half: ppo.Samples) -> Any:
-            return jax.grad(lambda actor: self.actor_loss(actor, half, std)[0])(actor)
+            gradient = jax.grad(lambda actor: self.actor_loss(actor, half, std)[0])(actor)
+            return device_axis.averaged(gradient)
 
         return cosine(*(gradient(half) for half in self._halves(samples)))
 
     def _halves(self, samples: ppo.Samples) -> tuple[ppo.Samples, ppo.Samples]:
-        """Samples [T * B, ...] of the first and of the other simulations."""
-        steps, envs = self.config.num_steps, self.config.num_envs
+        """Samples [T * B, ...] of the first and of the other simulations, of each device's."""
+        steps, envs = self.config.num_steps, device_axis.part(self.config.num_envs)
 
         def half(x: jax.Array, part: slice) -> jax.Array:
             rows = x.reshape(steps, envs, *x.shape[1:])[:, part]
@@ -129,8 +131,9 @@ class Improver:
 
     def _minibatches(self, key: jax.Array, epochs: int) -> jax.Array:
         config = self.config
-        num_samples = config.num_envs * config.num_steps
-        return shuffled_minibatches(key, epochs, num_samples, config.minibatch_size)
+        num_samples = device_axis.part(config.num_envs) * config.num_steps
+        size = device_axis.part(config.minibatch_size)
+        return shuffled_minibatches(key, epochs, num_samples, size)
 
 
 def cosine(a: Any, b: Any) -> jax.Array:

@@ -20,6 +20,7 @@ import jax.numpy as jnp
 import optax
 from flax import struct
 
+from getup_jax.core import device_axis
 from getup_jax.networks.mlp import OUTPUT_LAYER
 
 MOMENTUM = 0.1  # share of the newest batch, once many have been seen
@@ -58,9 +59,10 @@ def update(popart: PopArt, target: jax.Array) -> PopArt:
     axes = tuple(range(target.ndim - 1))
     weight = popart.weight + MOMENTUM * (1.0 - popart.weight)
     fraction = MOMENTUM / weight
-    delta = jnp.mean(target, axes) - popart.mean
+    delta = device_axis.mean(target, axes) - popart.mean
     spread = fraction * (1.0 - fraction) * jnp.square(delta)
-    variance = popart.variance + fraction * (jnp.var(target, axes) - popart.variance) + spread
+    newest = device_axis.var(target, axes)
+    variance = popart.variance + fraction * (newest - popart.variance) + spread
     return PopArt(mean=popart.mean + fraction * delta, variance=variance, weight=weight)
 
 

@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from getup_jax.core import device_axis
 from getup_jax.networks import gaussian
 
 
@@ -99,8 +100,8 @@ def value_loss(output: jax.Array, target: jax.Array) -> jax.Array:
 def standardize(advantage: jax.Array) -> jax.Array:
     """Every objective's advantages [..., K] to mean 0 and std 1 (Xu et al. 2023, equation 8)."""
     axes = tuple(range(advantage.ndim - 1))
-    centred = advantage - jnp.mean(advantage, axes)
-    return centred / (jnp.std(advantage, axes) + 1e-8)
+    centred = advantage - device_axis.mean(advantage, axes)
+    return centred / (device_axis.std(advantage, axes) + 1e-8)
 
 
 def clip_fraction(ratio: jax.Array, clip: float) -> jax.Array:
@@ -122,6 +123,6 @@ def explained_variance(value: jax.Array, target: jax.Array) -> jax.Array:
     1: the critic foresees every target; 0: no better than a constant; NaN: the targets are one.
     """
     axes = tuple(range(target.ndim - 1))
-    total = jnp.var(target, axes)
-    share = 1.0 - jnp.var(target - value, axes) / jnp.where(total > 0, total, jnp.nan)
+    total = device_axis.var(target, axes)
+    share = 1.0 - device_axis.var(target - value, axes) / jnp.where(total > 0, total, jnp.nan)
     return jnp.mean(share)

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from getup_jax.core import device_axis
 from getup_jax.core.types import Environment, StepOutput, check_output
 
 # (observation [B, O], key) -> (action [B, A], log_prob [B])
@@ -80,16 +81,17 @@ def summarize(collected: Rollout) -> dict[str, jax.Array]:
     """
     ended = collected.transition.terminated | collected.transition.truncated
     failed = collected.transition.terminated.astype(jnp.float32)
-    result = {f"rollout/{name}": jnp.mean(x) for name, x in collected.metrics.items()}
+    means = {f"rollout/{name}": jnp.mean(x) for name, x in collected.metrics.items()}
+    result = device_axis.averaged(means)
     for name, x in collected.episode.items():
         result[f"episode/{name}"] = masked_mean(x, ended & ~jnp.isnan(x))
-    result["episode/count"] = jnp.sum(ended)
+    result["episode/count"] = device_axis.summed(jnp.sum(ended))
     result["episode/terminated_share"] = masked_mean(failed, ended)
     return {name: x.astype(jnp.float32) for name, x in result.items()}
 
 
 def masked_mean(x: jax.Array, mask: jax.Array) -> jax.Array:
     """Mean of x where mask (same shape) is True, NaN if it is True nowhere; float32 scalar."""
-    total = jnp.sum(jnp.where(mask, x, 0.0))
-    count = jnp.sum(mask)
+    total = device_axis.summed(jnp.sum(jnp.where(mask, x, 0.0)))
+    count = device_axis.summed(jnp.sum(mask))
     return jnp.where(count > 0, total / jnp.maximum(count, 1), jnp.nan)

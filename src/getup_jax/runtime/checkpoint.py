@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 from getup_jax.config import Config, ConfigError
 from getup_jax.config.load import BrokenFileError, dump_yaml, load_saved_config
 from getup_jax.core.resources import asset_path
-from getup_jax.runtime import integrity
+from getup_jax.runtime import integrity, processes
 from getup_jax.runtime.integrity import DamagedError
 from getup_jax.runtime.pytree_store import (
     CheckpointError,
@@ -89,12 +89,15 @@ def save_learner(
             training that begins with it shall have it.
         metadata: what else checkpoint.json shall say; JSON values.
 
-    Raises CheckpointError where it could not be written; the others are then untouched.
+    All processes of a run call it, with one folder that they share. Raises CheckpointError where it
+    could not be written; the others are then untouched.
     """
     items = {POLICY: to_nested(policy), LEARNER: to_nested({"state": train_state})}
     final = folder / f"{iteration:08d}"
     _write(final, items, config, {"iteration": iteration, **(metadata or {})})
-    _prune(folder, iteration, config.train.keep)
+    if processes.is_first():
+        _prune(folder, iteration, config.train.keep)
+    processes.barrier("saved")
     return final
 
 
@@ -250,16 +253,18 @@ def _write(
     final = final.absolute()
     partial = final.parent / f"{integrity.PARTIAL}{final.name}"
     try:
-        final.parent.mkdir(parents=True, exist_ok=True)
-        integrity.remove_unfinished(final.parent)
-        partial.mkdir()
+        if processes.is_first():
+            final.parent.mkdir(parents=True, exist_ok=True)
+            integrity.remove_unfinished(final.parent)
+            partial.mkdir()
         for name, nested in items.items():
             write_item(partial / name, nested)
-        (partial / integrity.CONFIG).write_text(dump_yaml(config), encoding="utf-8")
-        size = integrity.write(partial, metadata)
-        if max_bytes is not None and size > max_bytes:
-            raise ValueError(f"{size} bytes, at most {max_bytes} are allowed")
-        integrity.replace_folder(partial, final)
+        if processes.is_first():
+            (partial / integrity.CONFIG).write_text(dump_yaml(config), encoding="utf-8")
+            size = integrity.write(partial, metadata)
+            if max_bytes is not None and size > max_bytes:
+                raise ValueError(f"{size} bytes, at most {max_bytes} are allowed")
+            integrity.replace_folder(partial, final)
     except Exception as error:
         shutil.rmtree(partial, ignore_errors=True)
         hint = "free disk space or choose another folder; earlier checkpoints are untouched"

@@ -83,6 +83,17 @@ class MetricsWriter:
         self.close()
 
 
+class NoMetrics:
+    """In the place of a `MetricsWriter`, where another process writes the history."""
+
+    wall_s = 0.0
+
+    def write(
+        self, iteration: int, steps: int, wall_s: float, metrics: Mapping[str, float]
+    ) -> None:
+        """Write nothing."""
+
+
 def read_metrics(path: str | Path) -> list[dict[str, Any]]:
     """The lines of a run folder's metrics.jsonl (or of that file) with their times, nulls as NaN.
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from getup_jax.runtime.console import Display
-from getup_jax.runtime.metric_file import MetricsWriter
+from getup_jax.runtime.metric_file import MetricsWriter, NoMetrics
 
 
 class MetricLog:
@@ -23,7 +23,7 @@ class MetricLog:
     """
 
     def __init__(
-        self, writer: MetricsWriter, display: Display, per_iteration: int, done: int
+        self, writer: MetricsWriter | NoMetrics, display: Display, per_iteration: int, done: int
     ) -> None:
         self._writer, self._display = writer, display
         self._per_iteration = per_iteration

@@ -1,5 +1,8 @@
 """Pytrees of arrays to orbax folders and back, as nested dicts of NumPy arrays.
 
+Of an array that is spread over processes each writes what it has, so that all of them save
+together; any number of processes reads it as a whole.
+
 A nested dict needs no class to be read again, and NumPy arrays carry no device, so what
 one machine writes another reads. Every leaf keeps its dtype, shape and bits.
 """
@@ -58,7 +61,10 @@ def from_nested(template: Any, nested: dict[str, Any], where: str) -> Any:
 
 
 def write_item(folder: Path, nested: dict[str, Any]) -> None:
-    """Write nested arrays into a new folder; returns when they are written."""
+    """Write nested arrays into a new folder; returns when they are written.
+
+    Where a run has many processes, all of them call it.
+    """
     with ocp.Checkpointer(ocp.PyTreeCheckpointHandler()) as checkpointer:
         checkpointer.save(folder.absolute(), args=ocp.args.PyTreeSave(_map(_pack, nested)))
     # It holds nothing but this machine's path, and is not read.
@@ -67,8 +73,19 @@ def write_item(folder: Path, nested: dict[str, Any]) -> None:
 
 def read_item(folder: Path) -> dict[str, Any]:
     """The nested NumPy arrays that `write_item` wrote, whatever their shapes."""
-    with ocp.Checkpointer(ocp.PyTreeCheckpointHandler()) as checkpointer:
-        return _unpack(checkpointer.restore(folder.absolute(), args=ocp.args.PyTreeRestore()))
+    me = jax.process_index()
+    alone = ocp.options.MultiprocessingOptions(primary_host=me, active_processes={me})
+    handler = ocp.PyTreeCheckpointHandler(multiprocessing_options=alone)
+    with ocp.Checkpointer(handler, multiprocessing_options=alone) as checkpointer:
+        return _unpack(_restore(checkpointer, folder.absolute()))
+
+
+def _restore(checkpointer: ocp.Checkpointer, folder: Path) -> Any:
+    """The item as NumPy arrays, on however many devices it was written."""
+    metadata: Any = checkpointer.metadata(folder)
+    tree = metadata.item_metadata.tree
+    plain = jax.tree.map(lambda _: ocp.RestoreArgs(restore_type=np.ndarray), tree)
+    return checkpointer.restore(folder, args=ocp.args.PyTreeRestore(restore_args=plain))
 
 
 def is_finite(nested: dict[str, Any]) -> bool:
@@ -85,7 +102,10 @@ def _is_key(leaf: Any) -> bool:
     return isinstance(leaf, jax.Array) and jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key)
 
 
-def _to_numpy(leaf: Any) -> np.ndarray:
+def _to_numpy(leaf: Any) -> Any:
+    """The leaf as a NumPy array; one of which other processes have parts stays as it is."""
+    if isinstance(leaf, jax.Array) and not (leaf.is_fully_addressable or leaf.is_fully_replicated):
+        return leaf
     return np.asarray(jax.random.key_data(leaf) if _is_key(leaf) else leaf)
 
 

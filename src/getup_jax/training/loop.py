@@ -15,12 +15,13 @@ from getup_jax.config import Config
 from getup_jax.physics import body_digest
 from getup_jax.physics.body_digest import warn_if_other
 from getup_jax.rl.state import owned
-from getup_jax.runtime import checkpoint
+from getup_jax.runtime import checkpoint, processes
 from getup_jax.runtime.console import Display, count, duration
-from getup_jax.runtime.metric_file import MetricsWriter
+from getup_jax.runtime.metric_file import MetricsWriter, NoMetrics
 from getup_jax.runtime.metric_log import MetricLog
 from getup_jax.runtime.pytree_store import CheckpointError, from_nested, is_finite, to_nested
 from getup_jax.runtime.signals import StopRequest
+from getup_jax.training.spread import spread
 
 Log = Callable[[str], None]
 CarryOver = Callable[[Any, checkpoint.LoadedPolicy, Log], Any]
@@ -75,24 +76,25 @@ class Loop:
         elif job.prepare is not None:
             learner = self._state.learner
             self._begin_with(job.prepare(learner.policy, display.log), learner.valuation)
-        self._step = self._compile()
+        iteration, self._world, self._state = spread(job.learner, self._world, self._state)
+        self._step = self._compile(iteration)
 
     @property
     def steps(self) -> int:
         """Control steps done; a Python int, since a long run overflows int32."""
         return self.done * steps_per_iteration(self._config)
 
-    def train(self, writer: MetricsWriter, stop: StopRequest) -> None:
+    def train(self, writer: MetricsWriter | NoMetrics, stop: StopRequest) -> None:
         """Iterate to the end or to a signal; then save."""
         config = self._config.train
         metric_log = MetricLog(writer, self._display, steps_per_iteration(self._config), self.done)
         saved_at = time.monotonic()
         self._display.start(self.steps)
-        while self.done < num_iterations(self._config) and stop.signal is None:
+        while self.done < num_iterations(self._config) and not _stops(stop):
             self._iterate(metric_log)
             if self.done % config.log_every == 0:
                 metric_log.flush(self.done)
-            if time.monotonic() - saved_at >= config.save_every_s:
+            if _of_first(time.monotonic() - saved_at >= config.save_every_s):
                 self._save_if_possible()
                 saved_at = time.monotonic()
         metric_log.flush(self.done)
@@ -146,11 +148,11 @@ class Loop:
         learner = owned(self._state.learner.beginning_with(policy, valuation))
         self._state = dataclasses.replace(self._state, learner=learner)
 
-    def _compile(self) -> Step:
+    def _compile(self, iteration: Step) -> Step:
         """The iteration as one program; nothing can make it compile again during the run."""
         self._display.log("compiling the training iteration ...")
         begin = time.monotonic()
-        step = jax.jit(self._job.learner.iteration, donate_argnums=1)
+        step = jax.jit(iteration, donate_argnums=1)
         compiled = step.lower(self._world, self._state).compile()
         self._display.log(f"compiled in {duration(time.monotonic() - begin)}; training")
         return compiled
@@ -164,10 +166,15 @@ class Loop:
             raise self._error(f"{', '.join(bad)}: not a finite number")
 
     def _save_if_possible(self) -> None:
-        """Save; a full disk is no reason to lose a run that may find space next time."""
+        """Save; a full disk is no reason to lose a run that may find space next time.
+
+        Of many processes that save together, one that cannot ends the run.
+        """
         try:
             self._save()
         except CheckpointError as error:
+            if processes.count() > 1:
+                raise
             self._display.log(f"warning: {error}")
 
     def _save(self) -> None:
@@ -189,3 +196,15 @@ class Loop:
         good = f"the last good checkpoint is {self.saved}" if self.saved else "nothing was saved"
         hint = "try a lower ppo.learning_rate or ppo.max_gradient_norm"
         return TrainingError(f"iteration {self.done}: {problem}; {good}; {hint}")
+
+
+def _stops(stop: StopRequest) -> bool:
+    """Whether a signal came, to any process: all end with the same iteration."""
+    if processes.count() > 1:
+        stop.signal = int(processes.gathered([stop.signal or 0]).max()) or None
+    return stop.signal is not None
+
+
+def _of_first(due: bool) -> bool:
+    """The first process's answer, for all: clocks differ."""
+    return due if processes.count() == 1 else bool(processes.gathered([due])[0, 0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import time
 from collections.abc import Callable
@@ -25,10 +26,10 @@ from getup_jax.imitation.slope_warm_start import warm_start_on_slopes
 from getup_jax.physics.body_digest import body_digest
 from getup_jax.rl.learner import Learner, make_learner
 from getup_jax.rl.state import PolicyState
-from getup_jax.runtime import checkpoint
+from getup_jax.runtime import checkpoint, processes
 from getup_jax.runtime.checkpoint import LoadedPolicy
 from getup_jax.runtime.console import Display, count, duration
-from getup_jax.runtime.metric_file import MetricsWriter, tensorboard_module
+from getup_jax.runtime.metric_file import MetricsWriter, NoMetrics, tensorboard_module
 from getup_jax.runtime.run_folder import prepare, resume_command
 from getup_jax.runtime.signals import StopRequest
 from getup_jax.training.loop import (
@@ -39,6 +40,7 @@ from getup_jax.training.loop import (
     num_iterations,
     steps_per_iteration,
 )
+from getup_jax.training.spread import check_divides, check_shared, described
 
 __all__ = ["Job", "TrainingError", "build_job", "run"]
 
@@ -120,6 +122,9 @@ def run(
         quiet: print nothing.
         build: makes the task and the learner.
 
+    It runs on every device of every process that `processes.join` has brought together, all of
+    which call this.
+
     Returns:
         None at the end of the run, else the number of the signal that stopped it.
 
@@ -127,21 +132,35 @@ def run(
     """
     folder = Path(run_folder)
     total = num_iterations(config) * steps_per_iteration(config)
-    with Display(total, quiet) as display, StopRequest(display.log) as stop:
-        prepare(folder, config, resume, display.log)
+    quiet = quiet or not processes.is_first()
+    check_divides(config, jax.device_count())
+    with (
+        processes.lost_is_an_error(),
+        Display(total, quiet) as display,
+        StopRequest(display.log) as stop,
+    ):
+        processes.first_alone(lambda: prepare(folder, config, resume, display.log))
+        check_shared(config, folder)
         if _finished(folder, config):
             display.log(f"{folder} has all of its {count(total)} steps; raise train.total_steps")
             return None
         if config.train.tensorboard:
             tensorboard_module()  # fail now rather than after minutes of compiling
         begin = time.monotonic()
-        display.log(f"building the task ({jax.devices()[0].platform}) ...")
+        display.log(f"building the task ({described()}) ...")
         loop = Loop(config, folder, build(config, display.log), display)
-        with MetricsWriter(folder, loop.done, config.train.tensorboard) as writer, stop.armed():
+        with _writer(folder, loop, config) as writer, stop.armed():
             loop.train(writer, stop)
         display.close()
         display.log(_closing(folder, loop, config, time.monotonic() - begin))
         return stop.signal if loop.done < num_iterations(config) else None
+
+
+def _writer(folder: Path, loop: Loop, config: Config) -> Any:
+    """The history, which the first process writes."""
+    if processes.is_first():
+        return MetricsWriter(folder, loop.done, config.train.tensorboard)
+    return contextlib.nullcontext(NoMetrics())
 
 
 def _finished(folder: Path, config: Config) -> bool:

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from getup_jax.config import CompositeConfig
+from getup_jax.core import device_axis
 from getup_jax.envs.composite.groups import Group, objective_weights
 from getup_jax.envs.composite.reference_windows import sample
 from getup_jax.envs.composite.task import CompositeTask
@@ -68,7 +69,7 @@ class DiscriminatorRewards:
             trained[group.name] = state
             metrics |= {f"discriminator_{group.name}/{k}": v for k, v in found.items()}
         for index, name in enumerate(self.names):
-            metrics[f"rollout/reward_{name}"] = jnp.mean(rewards[..., index])
+            metrics[f"rollout/reward_{name}"] = device_axis.mean(rewards[..., index])
         return trained, dataclasses.replace(transition, reward=self._merged(rewards)), metrics
 
     def _some(self, windows: jax.Array, key: jax.Array) -> jax.Array:
@@ -77,7 +78,8 @@ class DiscriminatorRewards:
         if share == 1.0:
             return windows
         order = jax.random.permutation(jax.random.fold_in(key, _DRAWN), len(windows))
-        return windows[order[: round(share * len(windows))]]
+        drawn = round(share * len(windows) * device_axis.size())  # on all devices together
+        return windows[order[: device_axis.part(drawn)]]
 
     def _merged(self, rewards: jax.Array) -> jax.Array:
         """Rewards [T, B, K] as the critics have them."""

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from getup_jax.config import CompositeConfig
+from getup_jax.core import device_axis
 from getup_jax.core.masked_update import replace_rows
 from getup_jax.core.types import Engine, Kinematics, PhysicsState, StepOutput, take
 from getup_jax.envs.composite.goals.combine import Goals
@@ -128,6 +129,7 @@ class CompositeTask:
         """One control step; episodes that end start anew."""
         after, output = self.advance(world, state, action)
         key_next, key_draw, key_start = jax.random.split(after.key, 3)
+        key_draw, key_start = device_axis.own_key(key_draw), device_axis.own_key(key_start)
         drawn = self._draw(world, key_draw, action.shape[0])
         done = output.done
 
@@ -144,6 +146,7 @@ class CompositeTask:
     ) -> tuple[CompositeState, StepOutput]:
         """One control step without resets; `observation` is the final one."""
         key, key_goals = jax.random.split(state.key)
+        key_goals = device_axis.own_key(key_goals)
         target = world.target_centre + world.target_scale * action
         target = jnp.clip(target, world.target_lower, world.target_upper)
         balls = self.goals.command(state.goals, state.physics.kinematics)

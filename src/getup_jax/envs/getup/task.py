@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from getup_jax.config import TaskConfig, TerrainConfig
+from getup_jax.core import device_axis
 from getup_jax.core.masked_update import replace_rows
 from getup_jax.core.mirror import Symmetry
 from getup_jax.core.quaternion import angle, conjugate, multiply
@@ -114,6 +115,7 @@ class GetUpTask:
         """One control step; episodes that end start anew."""
         after, output = self.advance(world, state, action)
         key_next, key_reset = jax.random.split(state.key)
+        key_reset = device_axis.own_key(key_reset)
         before = state.curriculum or CurriculumState()
         learned, output = self.curriculum.update(world.pool, before, after, output)
         drawn = self.curriculum.draw(world, learned, key_reset, action.shape[0])

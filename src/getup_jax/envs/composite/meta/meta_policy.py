@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 from flax import struct
 
+from getup_jax.core import device_axis
 from getup_jax.core.types import Kinematics, StepOutput
 from getup_jax.envs.composite.meta.observation_substitution import Substitution, substitute
 from getup_jax.envs.composite.reference_windows import References
@@ -148,7 +149,7 @@ class MetaTask:
         self, world: MetaWorld, state: MetaState, task: CompositeState, output: StepOutput
     ) -> tuple[MetaState, StepOutput]:
         key_next, key_meta = jax.random.split(state.key)
-        joined = self._join(world, task, key_meta)
+        joined = self._join(world, task, device_axis.own_key(key_meta))
         # only critics look at it, and they do not see the meta action
         none = jnp.zeros_like(joined[:, self.task.observation_size :])
         final = jnp.concatenate([output.final_observation, none], axis=-1)

@@ -16,6 +16,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
+from getup_jax.core import device_axis
 from getup_jax.core.types import Kinematics
 from getup_jax.motion.getup.features import FeatureLinks, torso_axes
 
@@ -89,4 +90,4 @@ def update(
 ) -> jax.Array:
     """The levels after episodes [B] with the wrench that ended; cell holds their indices [B]."""
     change = jnp.where(success, -_SUCCESS, _FAILURE) * ended
-    return jnp.clip(level.at[cell].add(change), 0.0, 1.0)
+    return jnp.clip(device_axis.added(level, cell, change), 0.0, 1.0)

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from getup_jax.config import TerrainConfig
+from getup_jax.core import device_axis
 from getup_jax.core.masked_update import running_mean
 from getup_jax.physics.terrain_map import REGIONS
 
@@ -51,12 +52,12 @@ def advance(
     """
     steps = state.steps + 1
     newest = success & (region == state.opened - 1)
-    successes = state.successes + jnp.sum(newest, dtype=jnp.int32)
+    successes = state.successes + device_axis.summed(jnp.sum(newest, dtype=jnp.int32))
     if config.curriculum == "success":
         opens = (successes >= config.unlock_successes) & (state.opened < len(REGIONS))
         opened = state.opened + opens.astype(jnp.int32)
     elif config.curriculum == "schedule":
-        each = -(-config.schedule_steps // len(region))  # in steps of the batch
+        each = -(-config.schedule_steps // (len(region) * device_axis.size()))  # steps of the batch
         opened = jnp.minimum(1 + steps // each, len(REGIONS)).astype(jnp.int32)
     else:
         opened = state.opened
