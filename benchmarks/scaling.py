@@ -38,6 +38,7 @@ from support.command import command, positive
 from support.projection import Iteration, Network, efficiency
 
 QUICK_MINIBATCH = 16
+LEAVE_S = 60
 ETHERNET, NVLINK = Network(latency_s=50e-6, bytes_per_s=3e9), Network(10e-6, 2e11)
 RATIOS = {"weak": ("two", "one"), "strong": ("strong", "one"), "of both cores": ("two", "both")}
 
@@ -107,10 +108,15 @@ class Run:
         return max(self._answer(process) for process in self._processes)
 
     def close(self) -> None:
-        """End the processes."""
+        """End the processes: they leave together once nobody asks for more."""
         for process in self._processes:
-            process.kill()
-            process.wait()
+            process.stdin.close()
+        for process in self._processes:
+            try:
+                process.wait(timeout=LEAVE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
 
     def _answer(self, process: subprocess.Popen[str]) -> Any:
         assert process.stdout is not None

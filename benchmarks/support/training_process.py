@@ -61,7 +61,7 @@ def main() -> None:
         begin = time.perf_counter()
         state, _ = jax.block_until_ready(step(world, state))
         answer(time.perf_counter() - begin)
-    processes.end(0)
+    processes.leave()
 
 
 def reduction_s(size: int) -> float:
