@@ -14,6 +14,7 @@ from poses import lying, random_targets
 from getup_jax.config import PhysicsConfig
 from getup_jax.core.types import PhysicsState, select, take
 from getup_jax.envs.getup import rewards
+from getup_jax.physics import native
 from getup_jax.physics.character import load_character
 from getup_jax.physics.engine import make_engine
 from getup_jax.physics.native import NativeEngine
@@ -296,3 +297,14 @@ def test_a_million_steps_of_a_random_policy(engine, character):
         (state, filtered), finite = play(state, filtered, key)
         assert np.asarray(finite).all()
     assert warnings_of(engine, size) == 0
+
+
+def test_many_states_are_placed_some_at_a_time_and_nothing_is_kept(character, monkeypatch):
+    qpos = lying(character, 7, seed=2)
+    qvel = np.random.default_rng(2).normal(size=(7, character.model.nv))
+    engine = NativeEngine(character, CONFIG)
+    whole = engine.place(qpos, qvel)
+    monkeypatch.setattr(native, "PLACE_CHUNK", 3)
+    assert_same(engine.place(qpos, qvel), whole)
+    assert whole.kinematics.qpos.shape[0] == 7
+    assert engine._batches == {}

@@ -55,10 +55,10 @@ def warm_start_on_slopes(
         action = learner.act(policy, env.observer.evened(observation))
         return Demonstrations(observation, action, decoder.target(action, condition), condition)
 
-    plane = dataclasses.replace(env, terrain=dataclasses.replace(env.terrain, **_FLAT_ONLY))
+    plane = env.with_terrain(dataclasses.replace(env.terrain, **_FLAT_ONLY))
     act = functools.partial(learner.act, policy)
     own = action_regression.collect(learner, plane, world, act, as_it_is, _OWN, keys[0])
-    anywhere = dataclasses.replace(env, terrain=dataclasses.replace(env.terrain, **_ALL_OPEN))
+    anywhere = env.with_terrain(dataclasses.replace(env.terrain, **_ALL_OPEN))
     stretched = _stretched(env)
 
     def head_up(observation: jax.Array) -> Demonstrations:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import copy
 import os
 import threading
-from typing import Any
+from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
@@ -55,6 +55,9 @@ class _Sizes:
         return shapes
 
 
+PLACE_CHUNK = 256  # states that `place` makes at once: MuJoCo keeps half a MB for each
+
+
 class NativeEngine:
     """Steps batches of one character with MuJoCo's own batch stepper, in float64."""
 
@@ -71,11 +74,17 @@ class NativeEngine:
         self._lock = threading.Lock()
 
     def place(self, qpos: Any, qvel: Any) -> PhysicsState:
-        """See `Engine.place`; runs on the host."""
+        """See `Engine.place`; runs on the host, some states at a time."""
         qpos, qvel = np.asarray(qpos, np.float64), np.asarray(qvel, np.float64)
         qpos, qvel = with_balls(qpos, qvel, self.model)
-        batch = self._batch(len(qpos))
-        return batch.place(qpos, qvel)
+        size = min(len(qpos), PLACE_CHUNK)
+        batch, parts = _HostBatch(self, size), []
+        for first in range(0, len(qpos), size):
+            # the last one is filled up, so that one batch serves all of them
+            index = np.minimum(np.arange(first, first + size), len(qpos) - 1)
+            placed, keep = batch.place(qpos[index], qvel[index]), len(qpos) - first
+            parts.append(jax.tree.map(lambda x, keep=keep: x[:keep], placed))
+        return jax.tree.map(lambda *x: jnp.asarray(np.concatenate(x)), *parts)
 
     def step(
         self,
@@ -157,8 +166,8 @@ class _HostBatch:
         rows = self._batch.state.view(np.uint32).copy()
         out = {k: np.empty(s.shape, s.dtype) for k, s in self.result_shapes[1].items()}
         self._write(np.zeros(len(qpos), bool), out)
-        kinematics = Kinematics(**{name: jnp.asarray(value) for name, value in out.items()})
-        return PhysicsState(engine=jnp.asarray(rows), kinematics=kinematics)
+        kinematics: Any = Kinematics(**cast(Any, out))  # NumPy until all parts are joined
+        return PhysicsState(engine=cast(Any, rows), kinematics=kinematics)
 
     def _put_balls(self, mask: np.ndarray, position: np.ndarray, velocity: np.ndarray) -> None:
         """Set the balls of the mask [B, Q]; they do not spin."""

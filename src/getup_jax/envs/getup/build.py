@@ -136,7 +136,6 @@ def assemble(
             terrain=config.terrain,
         ),
         latent_size=latent_size,
-        terrain=config.terrain,
         symmetry=find_symmetry(character, observer, prior),
     )
     place = Plane() if site is None else site.ground

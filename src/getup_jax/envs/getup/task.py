@@ -62,8 +62,17 @@ class GetUpTask:
     config: TaskConfig
     curriculum: Curriculum
     latent_size: int  # 0 without a pose prior
-    terrain: TerrainConfig | None = None  # None: a flat plane
     symmetry: Symmetry | None = None  # of observations and actions; None: there is none
+
+    @property
+    def terrain(self) -> TerrainConfig | None:
+        """Irregular ground; None: a flat plane."""
+        return self.curriculum.terrain
+
+    def with_terrain(self, terrain: TerrainConfig) -> GetUpTask:
+        """The same task on the same ground, whose regions open otherwise."""
+        curriculum = dataclasses.replace(self.curriculum, terrain=terrain)
+        return dataclasses.replace(self, curriculum=curriculum)
 
     @property
     def observation_size(self) -> int:

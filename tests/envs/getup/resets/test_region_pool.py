@@ -156,16 +156,6 @@ def test_an_evaluation_leaves_out_styles_that_cannot_start(uneven):
     np.testing.assert_array_equal(row[region == 2], [*range(ROWS), 0])
 
 
-def test_states_made_in_chunks_are_the_same(engine, character, monkeypatch):
-    qpos = np.tile(character.neutral_qpos, (5, 1))
-    qpos[:, 2] += 0.01 * np.arange(5)
-    qvel = np.zeros((5, character.model.nv))
-    whole = region_pool.place_in_chunks(engine, qpos, qvel)
-    monkeypatch.setattr(region_pool, "_PLACE_CHUNK", 2)
-    parts = region_pool.place_in_chunks(engine, qpos, qvel)
-    jax.tree.map(np.testing.assert_array_equal, whole, parts)
-
-
 # The task on irregular ground.
 
 
@@ -217,12 +207,12 @@ def test_the_head_is_on_the_floor_where_it_touches_the_slope(uneven, site):
 def test_a_training_step_counts_successes_and_opens_regions(uneven):
     env, world = uneven.environment, uneven.world
     quick = dataclasses.replace(TERRAIN, unlock_successes=1)
-    env = dataclasses.replace(env, terrain=quick)
+    env = env.with_terrain(quick)
     state = jax.jit(env.init, static_argnums=2)(world, jax.random.PRNGKey(0), 8)
     np.testing.assert_array_equal(state.region, 0)
     step = jax.jit(env.step)
     state, output = step(world, state, state.action)
-    assert int(state.curriculum.steps) == 1
+    assert int(state.curriculum.regions.steps) == 1
     np.testing.assert_array_equal(output.metrics["regions_open"], 1.0)
     # episodes that began lying and are about to end, standing as they should
     end = state.duration + env.config.stand_time_s - 0.01
@@ -240,5 +230,5 @@ def test_a_training_step_counts_successes_and_opens_regions(uneven):
     assert np.asarray(output.truncated).all()
     assert float(jnp.nanmean(output.episode["success_flat"])) == 1.0
     assert np.isnan(output.episode["success_easy"]).all()
-    assert int(state.curriculum.opened) == 2
+    assert int(state.curriculum.regions.opened) == 2
     assert set(np.asarray(state.region)) == {0, 1}  # the new episodes

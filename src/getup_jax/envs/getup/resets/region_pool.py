@@ -5,13 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.config import ConfigError, TaskConfig, TerrainConfig
 from getup_jax.core.resources import cache_dir
-from getup_jax.core.types import Engine, PhysicsState
+from getup_jax.core.types import Engine
 from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
 from getup_jax.envs.getup.resets.cache import Request, cached_starts
 from getup_jax.envs.getup.resets.lying import Starts
@@ -31,8 +30,6 @@ from getup_jax.envs.getup.resets.terrain_projection import project_to_ground
 from getup_jax.motion.clips import GetUp
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain_map import REGIONS, TerrainMap
-
-_PLACE_CHUNK = 2048  # states that the engine makes at once: the native one keeps memory for each
 
 Log = Callable[[str], None]
 
@@ -112,7 +109,7 @@ def _pool(
 ) -> Pool:
     starts = FreeStarts.join(parts)
     site.ground.check_spawn(starts.qpos[:, :2])
-    physics = place_in_chunks(engine, starts.qpos, starts.qvel)
+    physics = engine.place(starts.qpos, starts.qvel)
     check_finite(physics, starts.qpos)
     return Pool(
         physics=physics,
@@ -181,16 +178,3 @@ def _check_region(
         )
     if missing:
         log(f"start states: nothing in the region {REGIONS[region]!r} fits {', '.join(missing)}")
-
-
-def place_in_chunks(engine: Engine, qpos: np.ndarray, qvel: np.ndarray) -> PhysicsState:
-    """`engine.place` of many states [P], some at a time."""
-    size = min(_PLACE_CHUNK, len(qpos))
-    parts = []
-    for first in range(0, len(qpos), size):
-        # the last chunk is filled up, so that one batch serves all of them
-        index = np.minimum(np.arange(first, first + size), len(qpos) - 1)
-        state = engine.place(qpos[index], qvel[index])
-        keep = min(size, len(qpos) - first)
-        parts.append(jax.tree.map(lambda x, keep=keep: np.asarray(x)[:keep], state))
-    return jax.tree.map(lambda *x: jnp.asarray(np.concatenate(x)), *parts)
