@@ -23,7 +23,9 @@ LAYERS = [
     ["imitation"],
     ["training"],
     ["evaluation"],
+    ["functional.py"],
     ["release", "trajectory_search", "editor", "api.py"],
+    ["gym"],
     ["cli"],
 ]
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
