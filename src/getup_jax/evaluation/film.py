@@ -19,6 +19,7 @@ from getup_jax.envs.composite.goals import Marker
 from getup_jax.envs.composite.goals.drawing import add_markers
 from getup_jax.evaluation.metrics import episode_values
 from getup_jax.evaluation.rollout import Episodes
+from getup_jax.motion.io.glb_writer import Take, write_glb
 from getup_jax.runtime.console import Display
 
 STYLES = 8  # filmed at most
@@ -48,6 +49,20 @@ def film(path: Path, result: Episodes) -> None:
                 for image in images + images[-1:] * round(_END_S * fps):
                     writer.append_data(caption(image, text))
                 display.update(number, number / (time.monotonic() - begin), {})
+
+
+def write_takes(path: Path, result: Episodes) -> None:
+    """The same episodes as animations of a GLB file."""
+    env = result.task.environment
+    takes = [
+        Take(
+            label(result, episode),
+            1.0 / env.engine.control_dt,
+            result.trace.qpos[result.trace.running[:, episode], episode],
+        )
+        for episode in typical(result, STYLES)
+    ]
+    write_glb(path, env.character, takes)
 
 
 def typical(result: Episodes, most: int) -> list[int]:

@@ -148,6 +148,12 @@ def _add_outputs(group: argparse._ArgumentGroup) -> None:
         help="a typical episode of several styles; an .mp4 file",
     )
     add(
+        "--glb",
+        type=output(".glb"),
+        metavar="FILE",
+        help="the same episodes as animations of a mesh, for Blender and browsers; a .glb file",
+    )
+    add(
         "--plot",
         type=output(".png", ".pdf", ".svg"),
         metavar="FILE",

@@ -1,6 +1,7 @@
 """Make a folder to ship out of a run: the policy item alone, and a model card.
 
     getup-export runs/flat assets/checkpoints/flat --eval eval.json
+    getup-export runs/flat --onnx flat.onnx
 
 The folder holds the weights, the pose prior, the resolved config and the format version, is at
 most `checkpoint.MAX_EXPORT_BYTES` large, and is read by `getup-eval --ckpt FOLDER`.
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from getup_jax.config import ConfigError
+from getup_jax.evaluation.options import output
 from getup_jax.release.card import Provenance, model_card
 from getup_jax.runtime import checkpoint
 from getup_jax.runtime.checkpoint import LoadedPolicy
@@ -27,6 +29,15 @@ CARD = "README.md"
 def main(argv: Sequence[str] | None = None) -> int:
     """`getup-export`; returns the exit code. Errors are for the caller to print."""
     args = _parser().parse_args(argv)
+    if args.out is None and args.onnx is None:
+        raise ConfigError("getup-export: expected a folder OUT, --onnx FILE, or both; got neither")
+    if args.onnx is not None:
+        from getup_jax.release.onnx_export import export_onnx
+
+        for file in export_onnx(args.run, args.onnx):
+            print(f"{file}: {file.stat().st_size / 1e6:.2f} MB")
+    if args.out is None:
+        return 0
     folder = export(args.run, args.out, args.eval, args.machine, args.commit, args.before)
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
     print(f"{folder}: {size / 1e6:.2f} MB; look at {folder / CARD}")
@@ -104,9 +115,25 @@ def _parser() -> argparse.ArgumentParser:
         f"{checkpoint.MAX_EXPORT_BYTES / 1e6:g} MB, and write its model card.",
     )
     add = parser.add_argument
-    add("run", type=Path, metavar="RUN", help="a run folder, or one checkpoint in it")
     add(
-        "out", type=Path, metavar="OUT", help="the folder to write, such as assets/checkpoints/flat"
+        "run",
+        type=Path,
+        metavar="RUN",
+        help="a run folder, one checkpoint in it, or the name of a shipped policy",
+    )
+    add(
+        "out",
+        type=Path,
+        nargs="?",
+        metavar="OUT",
+        help="the folder to write, such as assets/checkpoints/flat",
+    )
+    add(
+        "--onnx",
+        type=output(".onnx"),
+        metavar="FILE",
+        help="the policy for programs without JAX: FILE, two more graphs and the MuJoCo model "
+        "beside it; needs the extra onnx",
     )
     add(
         "--eval",
