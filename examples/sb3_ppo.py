@@ -28,7 +28,9 @@ class Report(BaseCallback):
         if episodes:
             mean = np.mean([episode["r"] for episode in episodes])
             length = np.mean([episode["l"] for episode in episodes])
-            print(f"{self.num_timesteps:7} steps: return {mean:5.2f}, {length:5.1f} steps an episode")
+            print(
+                f"{self.num_timesteps:7} steps: return {mean:5.2f}, {length:5.1f} steps an episode"
+            )
 
 
 def main() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from gym_samples import noise, small
 
 sb3 = pytest.importorskip("stable_baselines3")

@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+
 from gym_samples import noise, small
 
 gymnasium = pytest.importorskip("gymnasium")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gym_samples import noise, small
 
 import getup_jax as gj
 from getup_jax.config import ConfigError
+from gym_samples import noise, small
 
 gymnasium = pytest.importorskip("gymnasium")
 SIZE, STEPS = 6, 45

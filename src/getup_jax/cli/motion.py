@@ -201,7 +201,7 @@ def _glb(args: argparse.Namespace, character: CharacterSpec) -> int:
     if not takes:
         raise MotionError(f"{', '.join(args.sources)}: expected motions, found curves alone")
     write_glb(args.out, character, takes)
-    Console().print(f"{args.out}: {len(takes)} motions")
+    Console().print(f"{args.out}: {len(takes)} motions", soft_wrap=True)
     return 0
 
 

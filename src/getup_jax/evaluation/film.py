@@ -154,9 +154,7 @@ class Camera:
         self._camera.distance, self._camera.elevation = 3.4, -14.0
         self._renderer = _renderer(self._model, size)
 
-    def picture(
-        self, qpos: np.ndarray, seen: View, markers: Sequence[Marker] = ()
-    ) -> np.ndarray:
+    def picture(self, qpos: np.ndarray, seen: View, markers: Sequence[Marker] = ()) -> np.ndarray:
         """A picture [rows, columns, 3] of a pose [7 + J]."""
         self._camera.azimuth = seen.azimuth
         self._camera.lookat[:] = (qpos[0], qpos[1], seen.ground + 0.65)

@@ -71,7 +71,8 @@ def add_checkpoint(parser: argparse.ArgumentParser) -> None:
         "--ckpt",
         metavar="PATH",
         default="flat",
-        help="a run folder, a checkpoint, or the name of a shipped policy (default: flat)",
+        help="a run folder, a checkpoint, the name of a shipped policy, or hf://OWNER/NAME on the "
+        "Hugging Face Hub (default: flat)",
     )
 
 

@@ -1,6 +1,6 @@
 """Environments for Gymnasium; importing this module registers them.
 
-    import gymnasium
+    import gymnasium  # pyright: ignore[reportMissingImports]
     import getup_jax.gym
 
     envs = gymnasium.make_vec("GetUp-v0", num_envs=64, config="quick")
@@ -15,7 +15,7 @@ from typing import Any
 from getup_jax.runtime.extras import missing
 
 try:
-    import gymnasium
+    import gymnasium  # pyright: ignore[reportMissingImports]
 except ImportError:
     raise ImportError(missing("gymnasium", "gym", "getup_jax.gym")) from None
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
 
 from getup_jax.config import ConfigError
 from getup_jax.gym.vector_env import GetUpVectorEnv
@@ -37,7 +37,7 @@ class SB3VecEnv(VecEnv):
         done = terminated | truncated
         found: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for index in np.flatnonzero(done):
-            found[index] = _final(infos, index, bool(truncated[index]))
+            found[index] = _final(infos, int(index), bool(truncated[index]))
         return observation, reward.astype(np.float32), done, found
 
     def close(self) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, ClassVar
+from typing import Any
 
-import gymnasium
+import gymnasium  # pyright: ignore[reportMissingImports]
 import jax
 import jax.numpy as jnp
 import numpy as np
-from gymnasium import error
+from gymnasium import error  # pyright: ignore[reportMissingImports]
 
 from getup_jax import api
 from getup_jax.evaluation.scenario import Scenario
@@ -27,7 +27,7 @@ from getup_jax.gym.vector_env import (
 class GetUpEnv(gymnasium.Env):
     """As `GetUpVectorEnv`, of one episode, which `reset` begins; slower by far than a batch."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"]}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012
 
     def __init__(
         self,

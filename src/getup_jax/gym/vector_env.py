@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from gymnasium import error, spaces
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
+from gymnasium import error, spaces  # pyright: ignore[reportMissingImports]
+from gymnasium.vector import AutoresetMode, VectorEnv  # pyright: ignore[reportMissingImports]
+from gymnasium.vector.utils import batch_space  # pyright: ignore[reportMissingImports]
 
 from getup_jax import api
 from getup_jax.config import ConfigError
@@ -33,7 +33,7 @@ class GetUpVectorEnv(VectorEnv):
     episode ended `final_obs` and `final_info`, with its verdicts, such as `success`.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: dict[str, Any] = {  # noqa: RUF012
         "render_modes": ["rgb_array"],
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }

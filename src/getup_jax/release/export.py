@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import subprocess
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from typing import Any
 from getup_jax.config import ConfigError
 from getup_jax.evaluation.options import output
 from getup_jax.release.card import Provenance, model_card
-from getup_jax.runtime import checkpoint
+from getup_jax.runtime import checkpoint, hub
 from getup_jax.runtime.checkpoint import LoadedPolicy
 from getup_jax.runtime.metric_file import FILE, read_metrics
 
@@ -38,14 +39,22 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(f"{file}: {file.stat().st_size / 1e6:.2f} MB")
     if args.out is None:
         return 0
-    folder = export(args.run, args.out, args.eval, args.machine, args.commit, args.before)
+    more = (args.eval, args.machine, args.commit, args.before)
+    if hub.is_address(args.out):
+        with tempfile.TemporaryDirectory() as folder:
+            name = args.out.rpartition("/")[2]
+            print(
+                f"{args.out}: {hub.upload(export(args.run, Path(folder) / name, *more), args.out)}"
+            )
+        return 0
+    folder = export(args.run, Path(args.out), *more)
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
     print(f"{folder}: {size / 1e6:.2f} MB; look at {folder / CARD}")
     return 0
 
 
 def export(
-    run: Path,
+    run: str | Path,
     out: Path,
     evaluations: Sequence[Path] = (),
     machine: str | None = None,
@@ -117,16 +126,15 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add(
         "run",
-        type=Path,
         metavar="RUN",
-        help="a run folder, one checkpoint in it, or the name of a shipped policy",
+        help="a run folder, one checkpoint in it, the name of a shipped policy, or hf://OWNER/NAME",
     )
     add(
         "out",
-        type=Path,
         nargs="?",
         metavar="OUT",
-        help="the folder to write, such as assets/checkpoints/flat",
+        help="the folder to write, such as assets/checkpoints/flat, or hf://OWNER/NAME to upload "
+        "it to the Hugging Face Hub; needs the extra hub",
     )
     add(
         "--onnx",

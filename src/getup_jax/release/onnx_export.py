@@ -91,6 +91,9 @@ def to_onnx(name: str, graph: Graph) -> Any:
         input_names=list(graph.inputs),
         output_names=list(graph.outputs),
     )
+    used = {name for node in model.graph.node for name in node.input}
+    for unused in [x for x in model.graph.initializer if x.name not in used]:
+        model.graph.initializer.remove(unused)  # a runtime would warn of each
     onnx.checker.check_model(model)
     return model
 

@@ -115,9 +115,7 @@ def _start(
     return parts.units.first(task.config, task.terrain is None, qpos[..., 7:], condition)
 
 
-def _targets(
-    task: GetUpTask, points: jax.Array, duration: jax.Array, time: jax.Array
-) -> jax.Array:
+def _targets(task: GetUpTask, points: jax.Array, duration: jax.Array, time: jax.Array) -> jax.Array:
     """Curve values [N, n, 3] at the look-ahead times."""
     ahead = jnp.asarray(task.config.lookahead_s, jnp.float32)
     s = (time[..., None] + ahead) / duration[..., None]
