@@ -22,7 +22,8 @@ from getup_jax import __version__
 from getup_jax.config import ConfigError
 from getup_jax.envs.getup.action_decoder import Units
 from getup_jax.envs.getup.build import make_task
-from getup_jax.evaluation.getup import restore_policy
+from getup_jax.evaluation.getup import evaluation_config, restore_policy
+from getup_jax.evaluation.scenario import Scenario
 from getup_jax.motion.library import load_motions
 from getup_jax.physics.character import load_character
 from getup_jax.physics.model_file import character_xml
@@ -64,7 +65,8 @@ def export_onnx(source: str | Path, file: Path) -> list[Path]:
 
 def policy_parts(loaded: LoadedPolicy) -> PolicyParts:
     """The policy's networks and what stands before and behind them; no start states are made."""
-    config = loaded.config
+    # as in an evaluation: what only helps to train changes the filter's first action
+    config = evaluation_config(loaded.config, Scenario(episodes=1))
     character = load_character(config.physics)
     prior = pose_prior.from_checkpoint(loaded.prior)
     task = make_task(config, character, character, prior)

@@ -17,7 +17,6 @@ from tiny_task import CONFIG, getups, untrained_prior
 from getup_jax.config import ConfigError, NetworkConfig
 from getup_jax.envs.getup.action_decoder import Units
 from getup_jax.envs.getup.build import assemble
-from getup_jax.envs.getup.curriculum.start_sampler import whole_episodes
 from getup_jax.physics.character import load_character
 from getup_jax.release import onnx_export
 from getup_jax.release.onnx_graphs import PolicyParts, graphs
@@ -25,14 +24,14 @@ from getup_jax.rl.learner import make_learner
 
 pytest.importorskip("jax2onnx")
 runtime = pytest.importorskip("onnxruntime")
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
 def built():
     """A tiny task in whole episodes, with a mirrored prior of random weights."""
     # a random policy falls, which must not end the episode
-    task = dataclasses.replace(whole_episodes(CONFIG.task), terminate_after_s=60.0)
+    task = dataclasses.replace(CONFIG.task, terminate_after_s=60.0)
     config = dataclasses.replace(CONFIG, task=task)
     character = load_character(config.physics)
     prior = untrained_prior(character, mirrored=True)

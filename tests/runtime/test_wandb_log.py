@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 import struct
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -28,6 +30,8 @@ def records(file: Path) -> list:
             continue
         _, size, kind = struct.unpack_from("<IHB", data, place)
         place += header
+        if place + size > len(data):  # not yet written
+            break
         part, place = part + data[place : place + size], place + size
         if kind in last:
             found.append(wandb_internal_pb2.Record.FromString(part))
@@ -45,16 +49,20 @@ def test_offline_metrics_are_in_the_runs_folder(tmp_path, monkeypatch):
         writer.write(1, 16, 0.5, {"reward": 0.25, "success": math.nan})
         writer.write(2, 32, 1.0, {"reward": 0.75, "success": 1.0})
     (file,) = folder.glob("wandb/offline-run-*/*.wandb")
-    written = records(file)
+    written, deadline = records(file), time.monotonic() + 60
+    while not any(record.HasField("exit") for record in written):  # its own process writes it
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+        written = records(file)
     kept = []
     for record in written:
         if record.HasField("history"):
             items = record.history.item
-            row = {x.key or x.nested_key[0]: x.value_json for x in items}
+            row = {x.key or x.nested_key[0]: json.loads(x.value_json) for x in items}
             kept.append({n: row[n] for n in ("steps", "reward", "success") if n in row})
     assert kept == [
-        {"steps": "16", "reward": "0.25"},
-        {"steps": "32", "reward": "0.75", "success": "1.0"},
+        {"steps": 16, "reward": 0.25},
+        {"steps": 32, "reward": 0.75, "success": 1.0},
     ]
     (run,) = (record.run for record in written if record.HasField("run"))
     assert (run.project, run.display_name) == ("getup", "my_run")
