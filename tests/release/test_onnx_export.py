@@ -15,7 +15,7 @@ import pytest
 from tiny_task import CONFIG, getups, untrained_prior
 
 from getup_jax.config import ConfigError, NetworkConfig
-from getup_jax.envs.getup.action_decoder import Units
+from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.build import assemble
 from getup_jax.physics.character import load_character
 from getup_jax.release import onnx_export
@@ -50,7 +50,7 @@ def parts(built):
     policy = policy.replace(statistics=statistics)
     return PolicyParts(
         task=env,
-        units=Units(world.prior, env.config.offset_scale),
+        decoder=ActionDecoder(world.prior, env.config.offset_scale),
         act=lambda observation: learner.act(policy, observation),
         target_lower=np.asarray(world.target_lower),
         target_upper=np.asarray(world.target_upper),

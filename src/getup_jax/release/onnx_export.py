@@ -20,7 +20,7 @@ import numpy as np
 
 from getup_jax import __version__
 from getup_jax.config import ConfigError
-from getup_jax.envs.getup.action_decoder import Units
+from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.build import make_task
 from getup_jax.evaluation.getup import evaluation_config, restore_policy
 from getup_jax.evaluation.scenario import Scenario
@@ -74,7 +74,9 @@ def policy_parts(loaded: LoadedPolicy) -> PolicyParts:
     margin = config.task.target_margin_rad
     return PolicyParts(
         task=task,
-        units=Units(prior, config.task.offset_scale, jnp.asarray(character.neutral_qpos[7:])),
+        decoder=ActionDecoder(
+            prior, config.task.offset_scale, jnp.asarray(character.neutral_qpos[7:])
+        ),
         act=lambda observation: learner.act(policy, observation),
         target_lower=(character.joint_lower - margin).astype(np.float32),
         target_upper=(character.joint_upper + margin).astype(np.float32),

@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.envs.getup.action_decoder import Units
+from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.observation import GRID_POINTS
 from getup_jax.envs.getup.task import GetUpTask
 from getup_jax.motion.getup import curves
@@ -40,7 +40,7 @@ class PolicyParts:
     """What a trained policy that gets up is made of."""
 
     task: GetUpTask  # for its observation, filter and units
-    units: Units  # of its actions
+    decoder: ActionDecoder  # of its actions
     act: Callable[[jax.Array], jax.Array]  # raw observations [N, O] to actions [N, A]
     target_lower: np.ndarray  # [J] rad
     target_upper: np.ndarray  # [J] rad
@@ -87,7 +87,7 @@ def _policy(parts: PolicyParts, observation: jax.Array) -> tuple[jax.Array, jax.
     before = observation[..., task.observer.slices()["action"]]
     filtered = task.config.filter * parts.act(observation) + (1.0 - task.config.filter) * before
     condition = task.observer.condition(observation)
-    target = parts.units.target(filtered, condition)
+    target = parts.decoder.target(filtered, condition)
     return jnp.clip(target, parts.target_lower, parts.target_upper), filtered
 
 
@@ -112,7 +112,7 @@ def _start(
     """The action [N, A] whose servo target is the pose [N, 7 + J] itself, or near it."""
     task = parts.task
     condition = _targets(task, points, duration, time)[..., 0, :]
-    return parts.units.first(task.config, task.terrain is None, qpos[..., 7:], condition)
+    return parts.decoder.first(task.config, task.terrain is None, qpos[..., 7:], condition)
 
 
 def _targets(task: GetUpTask, points: jax.Array, duration: jax.Array, time: jax.Array) -> jax.Array:
