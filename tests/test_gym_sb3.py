@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -61,3 +64,20 @@ def test_what_single_episodes_cannot_do_is_one_line(env):
         env.set_attr("num_envs", 2)
     with pytest.raises(ConfigError, match="cannot be called of single episodes"):
         env.env_method("reset")
+
+
+def test_a_process_that_would_crash_is_told_so():
+    pytest.importorskip("triton")
+    code = """
+import sys
+import getup_jax.gym
+from pathlib import Path
+Path.read_text = lambda self, encoding=None: "/usr/lib/libLLVM-15.so.1"
+try:
+    getup_jax.gym.sb3_env("quick")
+except ValueError as error:
+    sys.exit(str(error))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "pictures were rendered before" in done.stderr
+    assert len(done.stderr.splitlines()) == 1

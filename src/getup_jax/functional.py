@@ -44,7 +44,7 @@ def make_functional(config: Config, environment: Any, num_envs: int) -> Function
             "terminated": output.terminated,
             "truncated": output.truncated,
             "final_observation": output.final_observation,
-            "metrics": output.metrics,
+            "metrics": output.logged,
             "episode": output.episode,
         }
         return output.observation, state, scalar_reward(output, weights), output.done, info

@@ -10,8 +10,12 @@
 
 from __future__ import annotations
 
+import importlib.util
+import sys
+from pathlib import Path
 from typing import Any
 
+from getup_jax.config import ConfigError
 from getup_jax.runtime.extras import missing
 
 try:
@@ -49,10 +53,28 @@ def sb3_env(config: Any = "flat", num_envs: int = 1, **options: Any) -> Any:
     from getup_jax.gym.vector_env import GetUpVectorEnv
     from getup_jax.runtime.extras import load_extra
 
+    _load_triton()
     load_extra("stable_baselines3", "sb3", "sb3_env")
     from getup_jax.gym.sb3 import SB3VecEnv
 
     return SB3VecEnv(GetUpVectorEnv(num_envs, config, **options))
+
+
+def _load_triton() -> None:
+    """Load Triton before pictures are rendered; raises ConfigError where it is too late.
+
+    It comes with torch and is loaded when that first trains. It and Mesa's software renderer bring
+    an LLVM each, and the process crashes where Mesa's is the first one.
+    """
+    if "triton" in sys.modules or importlib.util.find_spec("triton") is None:
+        return
+    maps = Path("/proc/self/maps")
+    if maps.exists() and "libLLVM" in maps.read_text(encoding="utf-8"):
+        raise ConfigError(
+            "sb3_env: pictures were rendered before, and this process would crash when torch "
+            "trains; make the environment first, or import triton at the start"
+        )
+    importlib.import_module("triton")
 
 
 register()

@@ -63,7 +63,7 @@ class GetUpEnv(gymnasium.Env):
         action = check_actions(action, self.action_space.shape)
         self._state, output = self._advance(self.env.world, self._state, jnp.asarray(action)[None])
         output = jax.device_get(output.replace(extras=None))
-        info = {name: float(value[0]) for name, value in output.metrics.items()}
+        info = {name: float(value[0]) for name, value in output.logged.items()}
         if output.done[0]:
             info |= {name: float(value[0]) for name, value in output.episode.items()}
         return (

@@ -146,13 +146,13 @@ def check_actions(actions: Any, shape: tuple[int, ...] | None) -> np.ndarray:
 
 def _infos(output: Any, done: np.ndarray) -> dict[str, Any]:
     """Metrics where an episode goes on; where it ended, its last observation, metrics, verdicts."""
-    infos = _masked(output.metrics, ~done)
+    infos = _masked(output.logged, ~done)
     if not done.any():
         return infos
     final = np.full(len(done), None, object)
     for index in np.flatnonzero(done):
         final[index] = output.final_observation[index]
-    final_info = _masked({**output.metrics, **output.episode}, done)
+    final_info = _masked({**output.logged, **output.episode}, done)
     return infos | {
         "final_obs": final,
         "_final_obs": done.copy(),
