@@ -4,6 +4,8 @@ Most of their time is XLA's, which compiles more than twice as fast without opti
 code generator; `XLA_FLAGS= make test` runs what users run.
 """
 
+import contextlib
+import importlib
 import os
 import sys
 from collections.abc import Iterator
@@ -33,3 +35,8 @@ def _forgets() -> Iterator[None]:
             many = sum(1 for _ in lines) > _MANY
         if many:
             sys.modules["jax"].clear_caches()
+
+
+# where torch is installed: before any test renders, see getup_jax/gym/__init__.py
+with contextlib.suppress(ImportError):
+    importlib.import_module("triton")

@@ -23,7 +23,9 @@ LAYERS = [
     ["imitation"],
     ["training"],
     ["evaluation"],
+    ["functional.py"],
     ["release", "trajectory_search", "editor", "api.py"],
+    ["gym"],
     ["cli"],
 ]
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
@@ -56,7 +58,8 @@ def own_parts(path: Path) -> set[str]:
     package = ".".join(["getup_jax", *path.relative_to(PACKAGE).parts[:-1]])
     names = imported(path.read_text(encoding="utf-8"), package)
     parts = {name.split(".")[1] for name in names if name.startswith("getup_jax.")}
-    return parts - {"__version__"}
+    files = {part: f"{part}.py" for part in parts if (PACKAGE / f"{part}.py").exists()}
+    return {files.get(part, part) for part in parts} - {"__version__"}
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,7 @@ from getup_jax.evaluation import composite_rollout, driver, getup
 from getup_jax.evaluation.composite import CompositeScores
 from getup_jax.evaluation.metrics import Scores
 from getup_jax.evaluation.scenario import Scenario
+from getup_jax.functional import Functional, make_functional
 from getup_jax.pose_prior import prior as pose_prior
 from getup_jax.pose_prior.prior import PosePrior
 from getup_jax.runtime import checkpoint
@@ -139,6 +140,10 @@ class Env:
     def step(self, state: Any, action: jax.Array) -> tuple[Any, StepOutput]:
         """The next state after actions [num_envs, A], and what came of it; see `StepOutput`."""
         return self._step(self.world, state, action)
+
+    def functional(self) -> Functional:
+        """(reset, step) as pure functions of `world`, for training loops of one's own."""
+        return make_functional(self.config, self.environment, self.num_envs)
 
     @functools.cached_property
     def _reset(self) -> Callable[[Any, jax.Array], Any]:

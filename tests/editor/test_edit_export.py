@@ -91,3 +91,12 @@ def test_link_poses_are_those_of_mujoco(simulator):
         np.c_[data.xpos[1:], data.xquat[1:]],
         atol=1e-6,
     )
+
+
+def test_a_glb_file_has_the_motion_as_an_animation(motion, simulator):
+    gltf = pytest.importorskip("pygltflib")
+    document = gltf.GLTF2.load_from_bytes(export(motion, simulator.character, "glb"))
+    (animation,) = document.animations
+    assert animation.name == motion.curve.name
+    clock = document.accessors[animation.samplers[0].input]
+    assert clock.count == len(motion.frames.qpos)

@@ -129,6 +129,14 @@ def test_tensorboard_gets_the_finite_numbers(tmp_path, monkeypatch):
     assert opened == {"folder": str(tmp_path / "tensorboard"), "purge_step": 11}
 
 
+def test_the_library_writes_an_event_file(tmp_path):
+    pytest.importorskip("tensorboardX")
+    with MetricsWriter(tmp_path, tensorboard=True) as writer:
+        writer.write(1, 16, 0.5, {"some_reward": 0.25})
+    (file,) = (tmp_path / "tensorboard").glob("events.out.tfevents.*")
+    assert b"some_reward" in file.read_bytes()
+
+
 def test_tensorboard_that_is_not_installed_says_how_to_install_it(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "tensorboardX", None)
     with pytest.raises(ConfigError, match=r"pip install 'getup-jax\[tensorboard\]'"):

@@ -15,7 +15,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from getup_jax.cli.motion_report import FileReport, event_table, file_table, getup_table, report_of
 from getup_jax.config import MotionConfig, PhysicsConfig
+from getup_jax.evaluation.options import output
 from getup_jax.motion.clips import MotionError
+from getup_jax.motion.io.glb_writer import Take, require_glb, write_glb
 from getup_jax.motion.io.readers import ReadOptions, motion_files
 from getup_jax.motion.library import cpus, load_motions
 from getup_jax.motion.retarget.cache import Job, Result, read_npz, retarget_files, write_npz
@@ -31,6 +33,7 @@ examples:
   getup-motion events clips/fall.npz       when it lies, rises and stands
   getup-motion list authored clips/        get-ups that a config can train on
   getup-motion plot clips/ --out curves.png
+  getup-motion glb clips/ --out clips.glb  the motions as animations of a mesh
   getup-motion plot authored --strategies --out strategies.png
 """
 
@@ -67,6 +70,10 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument(
         "--strategies", action="store_true", help="only mean and deviation of each strategy"
     )
+    glb = _command(commands, "glb", _glb, "get-ups as animations of a mesh, for Blender")
+    glb.add_argument("sources", nargs="+", metavar="SOURCE", help=_SOURCE)
+    glb.add_argument("--out", type=output(".glb"), required=True, metavar="FILE", help="the file")
+    glb.add_argument("--curves", nargs="*", default=[], metavar="NAME", help="only these get-ups")
     events = _command(commands, "events", _events, "the get-ups in one file")
     events.add_argument("paths", nargs=1, type=Path, metavar="FILE")
     _add_reading(events)
@@ -183,6 +190,18 @@ def _plot(args: argparse.Namespace, character: CharacterSpec) -> int:
     else:
         plot_getups(library.getups, character, args.out)
     Console().print(f"{args.out}: {len(library.getups)} get-ups")
+    return 0
+
+
+def _glb(args: argparse.Namespace, character: CharacterSpec) -> int:
+    require_glb()
+    config = MotionConfig(source=tuple(args.sources), curves=tuple(args.curves))
+    clips = [getup.clip for getup in load_motions(config, character).getups if getup.clip]
+    takes = [Take(clip.name, clip.fps, clip.qpos) for clip in clips]
+    if not takes:
+        raise MotionError(f"{', '.join(args.sources)}: expected motions, found curves alone")
+    write_glb(args.out, character, takes)
+    Console().print(f"{args.out}: {len(takes)} motions", soft_wrap=True)
     return 0
 
 

@@ -87,6 +87,7 @@ class TrainConfig:
     save_every_s: float = number(300.0, least=0, most=math.inf)  # wall time between checkpoints
     keep: int = number(2, least=1, most=1_000_000)  # learner checkpoints kept
     tensorboard: bool = False  # extra: tensorboard
+    wandb: str | None = None  # project on Weights & Biases, extra: wandb; None: off
     init_from: str | None = None  # a checkpoint whose policy starts the run
     # also its critic, optimiser, curriculum and which starts are learned: the same task goes on
     # with another number of simulations or on another engine; `ppo.critic_first` is not needed

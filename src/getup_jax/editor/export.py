@@ -19,6 +19,7 @@ from getup_jax.evaluation import film
 from getup_jax.motion.getup.features import NAMES
 from getup_jax.motion.io.bvh_writer import write_bvh
 from getup_jax.motion.io.curve_file import dump
+from getup_jax.motion.io.glb_writer import Take, glb_bytes
 from getup_jax.motion.io.recording import Recording
 from getup_jax.motion.retarget.retarget import RetargetReport
 from getup_jax.motion.retarget.subprocess_job import Stop
@@ -29,7 +30,10 @@ _SOURCE = "getup-edit"
 
 
 def export(motion: Motion, character: CharacterSpec, kind: str, stop: Stop | None = None) -> bytes:
-    """The content of a file of one of the FORMATS; a film ends early once it is stopped."""
+    """The content of a file of one of the FORMATS, or of `glb`; a film ends early once stopped."""
+    if kind == "glb":
+        take = Take(motion.curve.name, 1.0 / motion.control_dt, motion.frames.qpos)
+        return glb_bytes(character, [take])
     if kind == "csv":
         return to_csv(motion, character).encode()
     if kind == "npz":

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
+import dataclasses
 import time
 import warnings
 from collections.abc import Iterator, Sequence
@@ -17,6 +19,7 @@ from getup_jax.envs.composite.goals import Marker
 from getup_jax.envs.composite.goals.drawing import add_markers
 from getup_jax.evaluation.metrics import episode_values
 from getup_jax.evaluation.rollout import Episodes
+from getup_jax.motion.io.glb_writer import Take, write_glb
 from getup_jax.runtime.console import Display
 
 STYLES = 8  # filmed at most
@@ -46,6 +49,20 @@ def film(path: Path, result: Episodes) -> None:
                 for image in images + images[-1:] * round(_END_S * fps):
                     writer.append_data(caption(image, text))
                 display.update(number, number / (time.monotonic() - begin), {})
+
+
+def write_takes(path: Path, result: Episodes) -> None:
+    """The same episodes as animations of a GLB file."""
+    env = result.task.environment
+    takes = [
+        Take(
+            label(result, episode),
+            1.0 / env.engine.control_dt,
+            result.trace.qpos[result.trace.running[:, episode], episode],
+        )
+        for episode in typical(result, STYLES)
+    ]
+    write_glb(path, env.character, takes)
 
 
 def typical(result: Episodes, most: int) -> list[int]:
@@ -107,19 +124,49 @@ def pictures(
     markers: Sequence[Sequence[Marker]] | None = None,
 ) -> Iterator[np.ndarray]:
     """The same, one after the other, for long films."""
-    model = copy.copy(model)
-    model.vis.quality.shadowsize = _SHADOW
-    data, camera = mujoco.MjData(model), mujoco.MjvCamera()
-    camera.distance, camera.elevation, camera.azimuth = 3.4, -14.0, view(qpos[0])
-    ground = ground_below(model, qpos[0])
-    with _renderer(model, size) as renderer:
+    seen = View.of(model, qpos[0])
+    with contextlib.closing(Camera(model, size)) as camera:
         for frame, row in enumerate(qpos):
-            data.qpos[:] = row
-            mujoco.mj_kinematics(model, data)
-            camera.lookat[:] = (row[0], row[1], ground + 0.65)
-            renderer.update_scene(data, camera)
-            add_markers(renderer.scene, markers[frame] if markers else ())
-            yield renderer.render()
+            yield camera.picture(row, seen, markers[frame] if markers else ())
+
+
+@dataclasses.dataclass(frozen=True)
+class View:
+    """From where, and above which ground, a motion is seen."""
+
+    azimuth: float  # degrees
+    ground: float  # m
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, qpos: np.ndarray) -> View:
+        """The view that shows a pose [7 + J] from its side."""
+        return cls(view(qpos), ground_below(model, qpos))
+
+
+class Camera:
+    """Takes pictures of poses; the camera follows the pelvis."""
+
+    def __init__(self, model: mujoco.MjModel, size: tuple[int, int] = SIZE) -> None:
+        """Raises ConfigError where this machine cannot render."""
+        self._model = copy.copy(model)
+        self._model.vis.quality.shadowsize = _SHADOW
+        self._data, self._camera = mujoco.MjData(self._model), mujoco.MjvCamera()
+        self._camera.distance, self._camera.elevation = 3.4, -14.0
+        self._renderer = _renderer(self._model, size)
+
+    def picture(self, qpos: np.ndarray, seen: View, markers: Sequence[Marker] = ()) -> np.ndarray:
+        """A picture [rows, columns, 3] of a pose [7 + J]."""
+        self._camera.azimuth = seen.azimuth
+        self._camera.lookat[:] = (qpos[0], qpos[1], seen.ground + 0.65)
+        self._data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._model, self._data)
+        self._renderer.update_scene(self._data, self._camera)
+        add_markers(self._renderer.scene, markers)
+        return self._renderer.render()
+
+    def close(self) -> None:
+        """Free the renderer."""
+        self._renderer.close()
 
 
 def ground_below(model: mujoco.MjModel, qpos: np.ndarray) -> float:

@@ -16,6 +16,7 @@ from getup_jax.config.task import OWN_POSES
 from getup_jax.envs.getup.build import BuiltTask, build_task
 from getup_jax.envs.getup.episode import LAST_S, STAND_LOWEST, STAND_MEAN
 from getup_jax.envs.getup.resets.rag_doll import DROPS
+from getup_jax.envs.getup.task import GetUpTask
 from getup_jax.evaluation import control_gain
 from getup_jax.evaluation.control_gain import ControlGain
 from getup_jax.evaluation.ground_kinds import Places
@@ -224,11 +225,14 @@ def chosen_styles(config: Config, scenario: Scenario) -> Choice | None:
     return mixtures
 
 
-def restore_policy(loaded: LoadedPolicy, task: BuiltTask) -> tuple[Learner, PolicyState]:
+def restore_policy(
+    loaded: LoadedPolicy, task: BuiltTask | GetUpTask
+) -> tuple[Learner, PolicyState]:
     """The learner of a task and the loaded policy in its form."""
     config = loaded.config
+    environment = task.environment if isinstance(task, BuiltTask) else task
     learner = make_learner(
-        task.environment, config.network, config.ppo, total_steps=config.train.total_steps
+        environment, config.network, config.ppo, total_steps=config.train.total_steps
     )
     template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0)).policy
     return learner, from_nested(template, loaded.policy, str(loaded.path))

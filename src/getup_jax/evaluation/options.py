@@ -71,7 +71,8 @@ def add_checkpoint(parser: argparse.ArgumentParser) -> None:
         "--ckpt",
         metavar="PATH",
         default="flat",
-        help="a run folder, a checkpoint, or the name of a shipped policy (default: flat)",
+        help="a run folder, a checkpoint, the name of a shipped policy, or hf://OWNER/NAME on the "
+        "Hugging Face Hub (default: flat)",
     )
 
 
@@ -146,6 +147,12 @@ def _add_outputs(group: argparse._ArgumentGroup) -> None:
         type=output(".mp4"),
         metavar="FILE",
         help="a typical episode of several styles; an .mp4 file",
+    )
+    add(
+        "--glb",
+        type=output(".glb"),
+        metavar="FILE",
+        help="the same episodes as animations of a mesh, for Blender and browsers; a .glb file",
     )
     add(
         "--plot",

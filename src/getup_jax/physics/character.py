@@ -18,7 +18,7 @@ from getup_jax.physics.terrain_map import TerrainMap
 from getup_jax.physics.terrain_model import FLOOR, replace_floor
 
 _REFUSALS = (ValueError, mujoco.FatalError)  # of files that MuJoCo does not take
-_SOLVERS = {
+SOLVERS = {
     "auto": mujoco.mjtSolver.mjSOL_PGS,  # the MJX engine, which has none, takes Newton
     "newton": mujoco.mjtSolver.mjSOL_NEWTON,
     "cg": mujoco.mjtSolver.mjSOL_CG,
@@ -145,7 +145,7 @@ def _refused(name: str, error: Exception) -> ConfigError:
 
 def _compile(spec: mujoco.MjSpec, config: PhysicsConfig) -> mujoco.MjModel:
     spec.option.timestep = 1.0 / (config.control_hz * config.substeps)
-    spec.option.solver = _SOLVERS[config.solver]
+    spec.option.solver = SOLVERS[config.solver]
     spec.option.iterations = config.iterations
     try:
         model = spec.compile()

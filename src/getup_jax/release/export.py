@@ -1,6 +1,7 @@
 """Make a folder to ship out of a run: the policy item alone, and a model card.
 
     getup-export runs/flat assets/checkpoints/flat --eval eval.json
+    getup-export runs/flat --onnx flat.onnx
 
 The folder holds the weights, the pose prior, the resolved config and the format version, is at
 most `checkpoint.MAX_EXPORT_BYTES` large, and is read by `getup-eval --ckpt FOLDER`.
@@ -11,13 +12,15 @@ from __future__ import annotations
 import argparse
 import json
 import subprocess
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from getup_jax.config import ConfigError
+from getup_jax.evaluation.options import output
 from getup_jax.release.card import Provenance, model_card
-from getup_jax.runtime import checkpoint
+from getup_jax.runtime import checkpoint, hub
 from getup_jax.runtime.checkpoint import LoadedPolicy
 from getup_jax.runtime.metric_file import FILE, read_metrics
 
@@ -27,14 +30,31 @@ CARD = "README.md"
 def main(argv: Sequence[str] | None = None) -> int:
     """`getup-export`; returns the exit code. Errors are for the caller to print."""
     args = _parser().parse_args(argv)
-    folder = export(args.run, args.out, args.eval, args.machine, args.commit, args.before)
+    if args.out is None and args.onnx is None:
+        raise ConfigError("getup-export: expected a folder OUT, --onnx FILE, or both; got neither")
+    if args.onnx is not None:
+        from getup_jax.release.onnx_export import export_onnx
+
+        for file in export_onnx(args.run, args.onnx):
+            print(f"{file}: {file.stat().st_size / 1e6:.2f} MB")
+    if args.out is None:
+        return 0
+    more = (args.eval, args.machine, args.commit, args.before)
+    if hub.is_address(args.out):
+        with tempfile.TemporaryDirectory() as folder:
+            name = args.out.rpartition("/")[2]
+            print(
+                f"{args.out}: {hub.upload(export(args.run, Path(folder) / name, *more), args.out)}"
+            )
+        return 0
+    folder = export(args.run, Path(args.out), *more)
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
     print(f"{folder}: {size / 1e6:.2f} MB; look at {folder / CARD}")
     return 0
 
 
 def export(
-    run: Path,
+    run: str | Path,
     out: Path,
     evaluations: Sequence[Path] = (),
     machine: str | None = None,
@@ -104,9 +124,24 @@ def _parser() -> argparse.ArgumentParser:
         f"{checkpoint.MAX_EXPORT_BYTES / 1e6:g} MB, and write its model card.",
     )
     add = parser.add_argument
-    add("run", type=Path, metavar="RUN", help="a run folder, or one checkpoint in it")
     add(
-        "out", type=Path, metavar="OUT", help="the folder to write, such as assets/checkpoints/flat"
+        "run",
+        metavar="RUN",
+        help="a run folder, one checkpoint in it, the name of a shipped policy, or hf://OWNER/NAME",
+    )
+    add(
+        "out",
+        nargs="?",
+        metavar="OUT",
+        help="the folder to write, such as assets/checkpoints/flat, or hf://OWNER/NAME to upload "
+        "it to the Hugging Face Hub; needs the extra hub",
+    )
+    add(
+        "--onnx",
+        type=output(".onnx"),
+        metavar="FILE",
+        help="the policy for programs without JAX: FILE, two more graphs and the MuJoCo model "
+        "beside it; needs the extra onnx",
     )
     add(
         "--eval",

@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 from getup_jax.config import Config, ConfigError
 from getup_jax.config.load import BrokenFileError, dump_yaml, load_saved_config
 from getup_jax.core.resources import asset_path
-from getup_jax.runtime import integrity, processes
+from getup_jax.runtime import hub, integrity, processes
 from getup_jax.runtime.integrity import DamagedError
 from getup_jax.runtime.pytree_store import (
     CheckpointError,
@@ -122,8 +122,9 @@ def load_learner(path: str | Path) -> LoadedLearner:
 def load_policy(path: str | Path) -> LoadedPolicy:
     """The policy at `path`, with no need to know its shapes.
 
-    `path` is a run folder, its checkpoints folder, one checkpoint, an exported policy, or
-    the name of a shipped one. Raises CheckpointError that says what is wrong.
+    `path` is a run folder, its checkpoints folder, one checkpoint, an exported policy, the name of
+    a shipped one, or hf://OWNER/NAME on the Hugging Face Hub. Raises CheckpointError that says what
+    is wrong.
     """
     return _newest(find_checkpoints(path), _read_policy)
 
@@ -142,7 +143,8 @@ def export_policy(source: str | Path, destination: str | Path) -> Path:
     curriculum = loaded.config.curriculum
     if curriculum is not None:
         curriculum = dataclasses.replace(curriculum, archive=None)
-    train = dataclasses.replace(loaded.config.train, init_from=None, init_learner=False)
+    own = {"init_from": None, "init_learner": False, "wandb": None}
+    train = dataclasses.replace(loaded.config.train, **own)
     physics = dataclasses.replace(loaded.config.physics, engine="auto")
     config = dataclasses.replace(loaded.config, physics=physics, curriculum=curriculum, train=train)
     _write(destination, items, config, loaded.metadata, MAX_EXPORT_BYTES)
@@ -158,7 +160,7 @@ def steps(folder: Path) -> list[Path]:
 
 def find_checkpoints(path: str | Path) -> list[Path]:
     """The checkpoints that `path` means, oldest first; see `load_policy` for its forms."""
-    folder = Path(path)
+    folder = hub.download(str(path)) if hub.is_address(path) else Path(path)
     if not folder.exists() and folder.parts[:-1] in ((), ("assets", CHECKPOINTS)):
         folder = asset_path(CHECKPOINTS, folder.name)
     if not folder.is_dir():

@@ -2,7 +2,8 @@
 
 Every line has `iteration` and `steps` beside the metrics; NaN is null. What a clock says, `wall_s`
 and `steps_per_s`, goes into times.jsonl, so that the same seed on the same machine gives the same
-metrics.jsonl, bit for bit. TensorBoard gets the same numbers where it is asked for.
+metrics.jsonl, bit for bit. TensorBoard and Weights & Biases get the same numbers where they are
+asked for.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any, TextIO
 
 from getup_jax.config import ConfigError
 from getup_jax.config.check import shown
+from getup_jax.runtime.wandb_log import WandbLog
 
 FILE = "metrics.jsonl"
 TIMES = "times.jsonl"
@@ -35,12 +37,18 @@ class MetricsWriter:
     a resumed run writes each iteration once.
     """
 
-    def __init__(self, folder: Path, resume_iteration: int = 0, tensorboard: bool = False) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        resume_iteration: int = 0,
+        tensorboard: bool = False,
+        wandb: WandbLog | None = None,
+    ) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         kept = _keep(folder / FILE, resume_iteration)
         times = _keep(folder / TIMES, resume_iteration)
         self.wall_s: float = times[-1]["wall_s"] if times else 0.0  # s, of the last line
-        self._board = None
+        self._board, self._wandb = None, wandb
         if tensorboard:
             # What an earlier run wrote past the last kept line is hidden.
             purge = kept[-1]["steps"] + 1 if kept else 0
@@ -68,6 +76,8 @@ class MetricsWriter:
             for name, value in values.items():
                 if value is not None:
                     self._board.add_scalar(name, value, steps)
+        if self._wandb is not None:
+            self._wandb.write(steps, values)
 
     def close(self) -> None:
         """Close the files."""
@@ -75,6 +85,8 @@ class MetricsWriter:
         self._times.close()
         if self._board is not None:
             self._board.close()
+        if self._wandb is not None:
+            self._wandb.close()
 
     def __enter__(self) -> MetricsWriter:
         return self

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import functools
 import time
 from collections.abc import Callable
@@ -32,6 +33,7 @@ from getup_jax.runtime.console import Display, count, duration
 from getup_jax.runtime.metric_file import MetricsWriter, NoMetrics, tensorboard_module
 from getup_jax.runtime.run_folder import prepare, resume_command
 from getup_jax.runtime.signals import StopRequest
+from getup_jax.runtime.wandb_log import WandbLog
 from getup_jax.training.loop import (
     CarryOver,
     Job,
@@ -146,20 +148,28 @@ def run(
             return None
         if config.train.tensorboard:
             tensorboard_module()  # fail now rather than after minutes of compiling
+        wandb = _wandb(folder, config)
         begin = time.monotonic()
         display.log(f"building the task ({described()}) ...")
         loop = Loop(config, folder, build(config, display.log), display)
-        with _writer(folder, loop, config) as writer, stop.armed():
+        with _writer(folder, loop, config, wandb) as writer, stop.armed():
             loop.train(writer, stop)
         display.close()
         display.log(_closing(folder, loop, config, time.monotonic() - begin))
         return stop.signal if loop.done < num_iterations(config) else None
 
 
-def _writer(folder: Path, loop: Loop, config: Config) -> Any:
+def _wandb(folder: Path, config: Config) -> WandbLog | None:
+    """The run on Weights & Biases, of the first process; None where it is not asked for."""
+    if config.train.wandb is None or not processes.is_first():
+        return None
+    return WandbLog(folder, config.train.wandb, dataclasses.asdict(config))
+
+
+def _writer(folder: Path, loop: Loop, config: Config, wandb: WandbLog | None) -> Any:
     """The history, which the first process writes."""
     if processes.is_first():
-        return MetricsWriter(folder, loop.done, config.train.tensorboard)
+        return MetricsWriter(folder, loop.done, config.train.tensorboard, wandb)
     return contextlib.nullcontext(NoMetrics())
 
 

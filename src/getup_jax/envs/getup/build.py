@@ -112,32 +112,9 @@ def assemble(
     user_rewards.check(config.task.rewards, RESERVED)
     site = None if config.terrain is None else _site(config, config.terrain)
     on_ground = character if site is None else site.character
-    engine = make_engine(on_ground, config.physics)
+    task = make_task(config, character, on_ground, prior)
+    engine, action_size = task.engine, task.action_size
     log(f"engine: {engine.name}")
-    latent_size = 0 if prior is None else prior.latent_size
-    action_size = latent_size + character.num_joints
-    observer = Observer.of(
-        character,
-        len(config.task.lookahead_s),
-        action_size,
-        1.0 if config.terrain is None else config.terrain.relief_gain,
-    )
-    task = GetUpTask(
-        engine=engine,
-        character=on_ground,
-        observer=observer,
-        config=config.task,
-        curriculum=Curriculum(
-            config=config.training_aids,
-            stand_start=config.task.stand_start,
-            control_dt=engine.control_dt,
-            most_lift=config.training_aids.assistive_wrench * on_ground.weight,
-            curve_match_rad=config.task.curve_match_rad,
-            terrain=config.terrain,
-        ),
-        latent_size=latent_size,
-        symmetry=find_symmetry(character, observer, prior),
-    )
     place = Plane() if site is None else site.ground
     limp = LimpBodies(on_ground, place, config.task, config.seed, log).on_the_flat()
     flat = FlatStarts(
@@ -163,6 +140,39 @@ def assemble(
         target_upper=jnp.asarray(character.joint_upper + margin, jnp.float32),
     )
     return BuiltTask(environment=task, world=world, prior=prior, getups=tuple(getups))
+
+
+def make_task(
+    config: Config,
+    character: CharacterSpec,
+    on_ground: CharacterSpec,
+    prior: PosePrior | None,
+) -> GetUpTask:
+    """The task without a world; `character` stands on a plane, `on_ground` where it is trained."""
+    latent_size = 0 if prior is None else prior.latent_size
+    observer = Observer.of(
+        character,
+        len(config.task.lookahead_s),
+        latent_size + character.num_joints,
+        1.0 if config.terrain is None else config.terrain.relief_gain,
+    )
+    engine = make_engine(on_ground, config.physics)
+    return GetUpTask(
+        engine=engine,
+        character=on_ground,
+        observer=observer,
+        config=config.task,
+        curriculum=Curriculum(
+            config=config.training_aids,
+            stand_start=config.task.stand_start,
+            control_dt=engine.control_dt,
+            most_lift=config.training_aids.assistive_wrench * on_ground.weight,
+            curve_match_rad=config.task.curve_match_rad,
+            terrain=config.terrain,
+        ),
+        latent_size=latent_size,
+        symmetry=find_symmetry(character, observer, prior),
+    )
 
 
 def _site(config: Config, terrain: TerrainConfig) -> Site:

@@ -116,7 +116,8 @@ class Observer:
         if self.relief_gain != 1.0:
             mean = jnp.mean(posture.height_map, axis=-1, keepdims=True)
             blocks["height_map"] = mean + self.relief_gain * (posture.height_map - mean)
-        flat = [blocks[name].reshape(len(action), size) for name, size in self.table]
+        batch = action.shape[:-1]
+        flat = [blocks[name].reshape(*batch, size) for name, size in self.table]
         return jnp.concatenate(flat, axis=-1)
 
     def _ground(self, root: jax.Array, to_world: jax.Array, terrain: Ground) -> jax.Array:

@@ -1,0 +1,91 @@
+"""One episode at a time as a Gymnasium `Env`."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import gymnasium  # pyright: ignore[reportMissingImports]
+import jax
+import jax.numpy as jnp
+import numpy as np
+from gymnasium import error  # pyright: ignore[reportMissingImports]
+
+from getup_jax import api
+from getup_jax.evaluation.scenario import Scenario
+from getup_jax.functional import reward_weights
+from getup_jax.gym.pictures import Pictures
+from getup_jax.gym.vector_env import (
+    SEEDS,
+    check_actions,
+    check_render_mode,
+    check_reset,
+    make_spaces,
+)
+
+
+class GetUpEnv(gymnasium.Env):
+    """As `GetUpVectorEnv`, of one episode, which `reset` begins; slower by far than a batch."""
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012
+
+    def __init__(
+        self,
+        config: Any = "flat",
+        render_mode: str | None = None,
+        training: bool | None = None,
+        scenario: Scenario | None = None,
+    ) -> None:
+        """See `GetUpVectorEnv`."""
+        self.render_mode = check_render_mode(render_mode)
+        training = scenario is None if training is None else training
+        self.env = api.make_env(config, 1, scenario, training)
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.env.control_dt)}
+        self.observation_space, self.action_space = make_spaces(self.env)
+        self._weights = np.array(reward_weights(self.env.config, self.env.environment))
+        self._pictures = Pictures(self.env)
+        self._state: Any = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """A new episode; the same seed gives the same one."""
+        check_reset(seed, options)
+        super().reset(seed=seed)
+        self._state = self.env.reset(int(self.np_random.integers(SEEDS)))
+        self._pictures.forget(np.ones(1, bool))
+        return np.array(self._state.observation[0]), {}
+
+    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """One control step."""
+        if self._state is None:
+            raise error.ResetNeeded("step: expected a call of reset before the first step")
+        action = check_actions(action, self.action_space.shape)
+        self._state, output = self._advance(self.env.world, self._state, jnp.asarray(action)[None])
+        output = jax.device_get(output.replace(extras=None))
+        info = {name: float(value[0]) for name, value in output.logged.items()}
+        if output.done[0]:
+            info |= {name: float(value[0]) for name, value in output.episode.items()}
+        return (
+            np.array(output.final_observation[0]),
+            float(output.reward[0].astype(np.float64) @ self._weights),
+            bool(output.terminated[0]),
+            bool(output.truncated[0]),
+            info,
+        )
+
+    def render(self) -> Any:
+        """A picture [rows, columns, 3]; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        if self._state is None:
+            raise error.ResetNeeded("render: expected a call of reset before")
+        return self._pictures.take(self._state, 0)
+
+    def close(self) -> None:
+        """Free the renderer."""
+        self._pictures.close()
+
+    @functools.cached_property
+    def _advance(self) -> Any:
+        return jax.jit(self.env.environment.advance)
