@@ -30,6 +30,8 @@ ENVIRONMENTS = {
     "CompositeWalk-v0": "composite_walk_location",
 }
 
+_LOADED = Path("/proc/self/maps")  # what libraries this process has loaded, on Linux
+
 __all__ = ["ENVIRONMENTS", "register", "sb3_env"]
 
 
@@ -68,8 +70,7 @@ def _load_triton() -> None:
     """
     if "triton" in sys.modules or importlib.util.find_spec("triton") is None:
         return
-    maps = Path("/proc/self/maps")
-    if maps.exists() and "libLLVM" in maps.read_text(encoding="utf-8"):
+    if _LOADED.exists() and "libLLVM" in _LOADED.read_text(encoding="utf-8"):
         raise ConfigError(
             "sb3_env: pictures were rendered before, and this process would crash when torch "
             "trains; make the environment first, or import triton at the start"
