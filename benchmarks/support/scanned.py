@@ -58,6 +58,10 @@ class Recorded:
     def action_size(self) -> int:
         return self.env.action_size
 
+    @property
+    def observation_size(self) -> int:
+        return self.env.observation_size
+
     def step(self, world: Any, state: Any, action: jax.Array) -> tuple[Any, StepOutput]:
         self.recorder.commands.clear()
         after, output = self.env.step(world, state, action)

@@ -99,6 +99,7 @@ def test_a_later_hangup_or_termination_is_no_impatience(tmp_path):
     with looping(tmp_path, LONG, stdout=subprocess.DEVNULL) as process:
         for number in (signal.SIGTERM, signal.SIGHUP):
             process.send_signal(number)
+            time.sleep(0.3)  # those that wait come by their number, not in their order
         time.sleep(1.3)
         for number in (signal.SIGTERM, signal.SIGHUP):
             process.send_signal(number)

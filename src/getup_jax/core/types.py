@@ -137,8 +137,11 @@ def check_output(env: Environment, action: jax.Array, output: StepOutput) -> Non
 
 def check_control(state: PhysicsState, ctrl: jax.Array, wrench: jax.Array | None) -> None:
     """Raise AssertionError, as it is traced, where a command does not fit the simulations."""
-    size, positions = state.kinematics.qpos.shape
-    chex.assert_shape(ctrl, (size, positions - 7))
+    size = len(ctrl)
+    if state.kinematics is not None:
+        positions = state.kinematics.qpos.shape[-1]
+        chex.assert_shape(state.kinematics.qpos, (size, positions))
+        chex.assert_shape(ctrl, (size, positions - 7))
     if wrench is not None:
         chex.assert_shape(wrench, (size, 6))
 

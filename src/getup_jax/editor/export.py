@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from getup_jax.editor.simulate import Motion
 from getup_jax.evaluation import film
-from getup_jax.motion.getup.features import NAMES
+from getup_jax.motion.getup.curves import NAMES
 from getup_jax.motion.io.bvh_writer import write_bvh
 from getup_jax.motion.io.curve_file import dump
 from getup_jax.motion.io.glb_writer import Take, glb_bytes

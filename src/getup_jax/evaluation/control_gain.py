@@ -27,7 +27,7 @@ from getup_jax.envs.getup.build import BuiltTask
 from getup_jax.envs.getup.episode import LYING
 from getup_jax.evaluation.rollout import Progress, run_episodes
 from getup_jax.evaluation.scenario import Plan
-from getup_jax.motion.getup.features import NAMES
+from getup_jax.motion.getup.curves import NAMES
 from getup_jax.rl.learner import Learner
 
 # Standard deviation of a control point's move (m, rad, rad), each of its own. The curves between

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from getup_jax.core.mirror import SignedPermutation
-from getup_jax.motion.getup.features import FeatureLinks, features
+from getup_jax.motion.getup.curves import FeatureLinks, features
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.mirror_image import is_symmetric, joint_mirror
 

@@ -11,7 +11,7 @@ from flax import struct
 
 from getup_jax.core import quaternion
 from getup_jax.core.types import Kinematics
-from getup_jax.motion.getup.features import FeatureLinks, features
+from getup_jax.motion.getup.curves import FeatureLinks, features
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain import Ground
 

@@ -15,7 +15,7 @@ from getup_jax.motion.authoring.keyframe_clip import clip_from_keyframes
 from getup_jax.motion.authoring.keyframe_file import read_keyframes
 from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.getup import curves
-from getup_jax.motion.getup.features import NAMES, FeatureLinks, features
+from getup_jax.motion.getup.curves import NAMES, FeatureLinks, features
 from getup_jax.motion.io.curve_file import check_start, read_curve_file
 from getup_jax.physics.character import CharacterSpec
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.getup import curves
+from getup_jax.motion.getup.curves import FeatureLinks, features
 from getup_jax.motion.getup.events import (
     DEFAULTS,
     Event,
@@ -17,7 +18,6 @@ from getup_jax.motion.getup.events import (
     heights_of,
     link_positions,
 )
-from getup_jax.motion.getup.features import FeatureLinks, features
 from getup_jax.motion.getup.strategies import classify
 from getup_jax.physics.character import CharacterSpec
 

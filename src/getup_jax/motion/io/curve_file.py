@@ -27,8 +27,7 @@ import yaml
 from getup_jax.config import yaml_text
 from getup_jax.config.yaml_text import YamlError
 from getup_jax.motion.clips import Clip, GetUp, MotionError
-from getup_jax.motion.getup.curves import NUM_POINTS
-from getup_jax.motion.getup.features import NAMES
+from getup_jax.motion.getup.curves import NAMES, NUM_POINTS
 from getup_jax.physics.character import CharacterSpec
 
 SUFFIXES = (".yaml", ".yml")

@@ -15,7 +15,7 @@ from getup_jax.core.types import Kinematics
 from getup_jax.envs.getup.curriculum import assistive_wrench, start_prioritisation
 from getup_jax.envs.getup.curriculum.state import CurriculumState
 from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
-from getup_jax.motion.getup.features import FeatureLinks, features
+from getup_jax.motion.getup.curves import FeatureLinks, features
 
 MOST = 300.0  # N
 

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 
 from getup_jax.core import device_axis
 from getup_jax.core.types import Kinematics
-from getup_jax.motion.getup.features import FeatureLinks, torso_axes
+from getup_jax.motion.getup.curves import FeatureLinks, torso_axes
 
 _FULL_AT_M = 0.15  # below the curve, where the lift is at its most
 _FULL_AT_RAD = 0.5  # off the curve's angles, where the turn is at its most

@@ -19,7 +19,7 @@ from getup_jax.envs.getup.resets.archived_states import FoundPath, load_paths
 from getup_jax.envs.getup.resets.lying import Log, Starts
 from getup_jax.envs.getup.resets.style_matching import fits, least_used
 from getup_jax.motion.clips import GetUp
-from getup_jax.motion.getup.features import FeatureLinks, features
+from getup_jax.motion.getup.curves import FeatureLinks, features
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.settle import lift_to_ground, settle
 from getup_jax.physics.surface import TOUCH_M
