@@ -19,7 +19,7 @@ if os.environ["JAX_PLATFORMS"] == "cpu":
 if sys.platform == "linux" and "DISPLAY" not in os.environ:
     os.environ.setdefault("MUJOCO_GL", "egl")
 
-_MANY = 20_000  # memory maps of a process; every compiled program has some
+_MANY = 6_000  # memory maps of a process; every compiled program has some
 
 
 @pytest.fixture(autouse=True, scope="module")

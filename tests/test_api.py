@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
 
@@ -61,8 +62,10 @@ def test_a_policy_is_trained_and_loaded(tmp_path):
 
 
 def test_training_episodes_are_asked_for(policy):
-    env = gj.make_env(policy, num_envs=2, training=True)
-    assert env.config == policy.config
+    task = dataclasses.replace(policy.config.task, pool_size=84)
+    small = dataclasses.replace(policy, config=dataclasses.replace(policy.config, task=task))
+    env = gj.make_env(small, num_envs=2, training=True)
+    assert env.config == small.config
     assert env.reset().observation.shape == (2, env.observation_size)
     assert gj.make_env(policy, scenario=gj.Scenario(episodes=2)).config.curriculum is None
 

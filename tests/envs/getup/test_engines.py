@@ -24,7 +24,9 @@ def test_a_policys_first_actions_are_the_same_on_native_and_mjx(character, built
     output = policy.actor["params"][OUTPUT_LAYER]
     output["kernel"] = 100.0 * output["kernel"]
     actions = [
-        learner.act(policy, task.environment.start(task.world, getup, kind, row).observation)
+        learner.act(
+            policy, jax.jit(task.environment.start)(task.world, getup, kind, row).observation
+        )
         for task in (built, other)
     ]
     assert np.abs(actions[0]).max() > 1.0

@@ -64,7 +64,7 @@ def test_a_run_goes_on_with_other_numbers_of_processes_and_devices(launch, finis
     assert all(np.isfinite(row["loss/value"]) for row in rows)
 
 
-@pytest.mark.parametrize("killed", [0, 1])
+@pytest.mark.parametrize("killed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_killed_process_ends_the_other_and_the_run_resumes(launch, tmp_path, killed):
     processes = launch.two(tmp_path, total(10_000_000), "train.save_every_s=0.2")
     wait_for(lambda: checkpoint.steps(tmp_path / "checkpoints"), processes)
