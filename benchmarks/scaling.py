@@ -34,7 +34,7 @@ from rich.table import Table
 
 from getup_jax.config import ConfigError
 from getup_jax.config.load import load_config
-from support.command import command, positive
+from support.command import command, parser_of, positive
 from support.projection import Iteration, Network, efficiency
 
 QUICK_MINIBATCH = 16
@@ -172,17 +172,11 @@ def show(result: dict[str, Any]) -> None:
 
 
 def parse_args() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     add = parser.add_argument
-    add("settings", nargs="*", metavar="section.key=value", help="changes of the config")
-    add("--config", default="flat", help="a config file or a shipped config (default: flat)")
     add("--num-envs", type=positive, metavar="N", help="simulations a process; default: config's")
     add("--num-steps", type=positive, default=32, metavar="N", help="of an iteration (default: 32)")
     add("--rounds", type=positive, default=7, metavar="R", help="(default: 7)")
-    add("--json", type=Path, metavar="FILE", help="write the result to this file")
-    add("--quick", action="store_true", help="smallest sizes, to see that it works: no rates")
     return parser.parse_intermixed_args()
 
 

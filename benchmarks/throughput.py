@@ -46,7 +46,7 @@ from rich.table import Table
 from getup_jax.config import Config
 from getup_jax.rl.state import TrainState
 from getup_jax.training.run import build_job
-from support.command import command, duration, positive
+from support.command import command, duration, parser_of, positive
 from support.replay import Run, engine_of, raw_run
 from support.setting import make_config
 
@@ -70,19 +70,13 @@ def main() -> None:
 
 
 def parse_args() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(__doc__)
     add = parser.add_argument
-    add("settings", nargs="*", metavar="section.key=value", help="changes of the config")
-    add("--config", default="flat", help="a config file or a shipped config (default: flat)")
-    add("--json", type=Path, metavar="FILE", help="write the result to this file")
     add("--engine", help="auto, native, mjx or mjx-warp; default: the config's")
     add("--num-envs", type=positive, metavar="N", help="simulations; default: the config's")
     add("--num-steps", type=positive, metavar="N", help="control steps a round (default: 8)")
     add("--seconds", type=duration, default=8.0, metavar="S", help="of timed rounds (default: 8)")
     add("--warm-up", type=duration, default=WARM_UP_S, metavar="S", help="simulated (default: 3)")
-    add("--quick", action="store_true", help="smallest sizes, to see that it works: no rates")
     return parser.parse_intermixed_args()
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 from pathlib import Path
 
+import make_settings
 import pytest
 
 import getup_jax as gj
@@ -61,13 +61,10 @@ def test_the_front_door_is_documented():
 
 
 def test_the_page_of_settings_is_that_of_the_code():
-    spec = importlib.util.spec_from_file_location("make_settings", ROOT / "docs/make_settings.py")
-    assert spec is not None
-    assert spec.loader is not None
-    page = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(page)
-    text = page.text()
-    assert text == page.FILE.read_text(encoding="utf-8"), "run python docs/make_settings.py"
+    text = make_settings.text()
+    assert text == make_settings.FILE.read_text(encoding="utf-8"), (
+        "run python docs/make_settings.py"
+    )
     rows = [line for line in text.splitlines() if line.startswith("| `")]
     assert len(rows) > 100
     assert [row for row in rows if row.endswith("|  |")] == [], "settings without a comment"

@@ -6,6 +6,7 @@ import argparse
 import math
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 
 def command(main: Callable[[], None]) -> None:
@@ -17,6 +18,19 @@ def command(main: Callable[[], None]) -> None:
             raise
         print(f"{type(error).__name__}: {error}", file=sys.stderr)
         sys.exit(2)
+
+
+def parser_of(doc: str | None) -> argparse.ArgumentParser:
+    """The arguments that every benchmark of a config has: settings, --config, --json, --quick."""
+    parser = argparse.ArgumentParser(
+        description=doc, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("settings", nargs="*", metavar="section.key=value", help="changes of the config")
+    add("--config", default="flat", help="a config file or a shipped config (default: flat)")
+    add("--json", type=Path, metavar="FILE", help="write the result to this file")
+    add("--quick", action="store_true", help="smallest sizes, to see that it works: no rates")
+    return parser
 
 
 def positive(text: str) -> int:

@@ -1,18 +1,11 @@
 from __future__ import annotations
 
-import importlib.util
 import json
 from pathlib import Path
 
 import numpy as np
+import plot_imitation_error as plot
 import pytest
-
-SCRIPT = Path(__file__).parents[2] / "docs" / "plot_imitation_error.py"
-spec = importlib.util.spec_from_file_location("plot_imitation_error", SCRIPT)
-assert spec is not None
-assert spec.loader is not None
-plot = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(plot)
 
 
 def entry(steps: int, error: float, reward: float = 0.5) -> dict:

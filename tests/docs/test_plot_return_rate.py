@@ -1,19 +1,11 @@
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
-from pathlib import Path
 
 import numpy as np
+import plot_return_rate as plot
 import pytest
-
-SCRIPT = Path(__file__).parents[2] / "docs" / "plot_return_rate.py"
-spec = importlib.util.spec_from_file_location("plot_return_rate", SCRIPT)
-assert spec is not None
-assert spec.loader is not None
-plot = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(plot)
 
 
 def rows(values: list[float], opened: list[float]) -> list[dict]:

@@ -11,20 +11,11 @@ import jax.numpy as jnp
 import numpy as np
 from gymnasium import error  # pyright: ignore[reportMissingImports]
 
-from getup_jax import api
 from getup_jax.evaluation.scenario import Scenario
-from getup_jax.functional import reward_weights
-from getup_jax.gym.pictures import Pictures
-from getup_jax.gym.vector_env import (
-    SEEDS,
-    check_actions,
-    check_render_mode,
-    check_reset,
-    make_spaces,
-)
+from getup_jax.gym.vector_env import Episodes, check_actions, check_reset, make_spaces
 
 
-class GetUpEnv(gymnasium.Env):
+class GetUpEnv(Episodes, gymnasium.Env):
     """As `GetUpVectorEnv`, of one episode, which `reset` begins; slower by far than a batch."""
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012
@@ -37,14 +28,8 @@ class GetUpEnv(gymnasium.Env):
         scenario: Scenario | None = None,
     ) -> None:
         """See `GetUpVectorEnv`."""
-        self.render_mode = check_render_mode(render_mode)
-        training = scenario is None if training is None else training
-        self.env = api.make_env(config, 1, scenario, training)
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.env.control_dt)}
+        self._build(1, config, render_mode, training, scenario)
         self.observation_space, self.action_space = make_spaces(self.env)
-        self._weights = np.array(reward_weights(self.env.config, self.env.environment))
-        self._pictures = Pictures(self.env)
-        self._state: Any = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -52,9 +37,7 @@ class GetUpEnv(gymnasium.Env):
         """A new episode; the same seed gives the same one."""
         check_reset(seed, options)
         super().reset(seed=seed)
-        self._state = self.env.reset(int(self.np_random.integers(SEEDS)))
-        self._pictures.forget(np.ones(1, bool))
-        return np.array(self._state.observation[0]), {}
+        return self._begin(self.np_random)[0], {}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """One control step."""

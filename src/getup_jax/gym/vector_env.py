@@ -25,7 +25,36 @@ SEEDS = 2**31
 ACTION_LIMIT = 10.0
 
 
-class GetUpVectorEnv(VectorEnv):
+class Episodes:
+    """What environments of one episode and of many have in common: the task, and its state."""
+
+    metadata: dict[str, Any]
+
+    def _build(
+        self,
+        num_envs: int,
+        config: Any,
+        render_mode: str | None,
+        training: bool | None,
+        scenario: Scenario | None,
+    ) -> None:
+        """See `GetUpVectorEnv`."""
+        self.render_mode = check_render_mode(render_mode)
+        training = scenario is None if training is None else training
+        self.env = api.make_env(config, num_envs, scenario, training)
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.env.control_dt)}
+        self._weights = np.array(reward_weights(self.env.config, self.env.environment))
+        self._pictures = Pictures(self.env)
+        self._state: Any = None
+
+    def _begin(self, random: np.random.Generator) -> np.ndarray:
+        """All episodes anew; their observations [B, O]."""
+        self._state = self.env.reset(int(random.integers(SEEDS)))
+        self._pictures.forget(np.ones(self.env.num_envs, bool))
+        return np.array(self._state.observation)
+
+
+class GetUpVectorEnv(Episodes, VectorEnv):
     """`num_envs` episodes of a config's task.
 
     Observations [B, O], actions [B, A] and what they mean are those of `getup_jax.make_env`; the
@@ -58,17 +87,11 @@ class GetUpVectorEnv(VectorEnv):
 
         Raises ConfigError for what is not possible.
         """
-        self.render_mode = check_render_mode(render_mode)
-        training = scenario is None if training is None else training
-        self.env = api.make_env(config, num_envs, scenario, training)
+        self._build(num_envs, config, render_mode, training, scenario)
         self.num_envs = num_envs
-        self.metadata = {**self.metadata, "render_fps": round(1.0 / self.env.control_dt)}
         self.single_observation_space, self.single_action_space = make_spaces(self.env)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._weights = np.array(reward_weights(self.env.config, self.env.environment))
-        self._pictures = Pictures(self.env)
-        self._state: Any = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -76,9 +99,7 @@ class GetUpVectorEnv(VectorEnv):
         """All episodes anew; the same seed gives the same ones."""
         check_reset(seed, options)
         super().reset(seed=seed)
-        self._state = self.env.reset(int(self.np_random.integers(SEEDS)))
-        self._pictures.forget(np.ones(self.num_envs, bool))
-        return np.array(self._state.observation), {}
+        return self._begin(self.np_random), {}
 
     def step(
         self, actions: Any
