@@ -130,17 +130,30 @@ def stands(record: Record) -> jax.Array:
     return reached & (record.last_ratio >= STAND_LOWEST) & (mean >= STAND_MEAN)
 
 
+def runs_to_the_end(state: EpisodeState) -> jax.Array:
+    """Which episodes [B] can end standing; one that is cut short says nothing about success."""
+    whole = jnp.ones(len(state.time), bool)
+    return whole if state.until is None else jnp.isinf(state.until)
+
+
+def is_alone(state: EpisodeState) -> jax.Array:
+    """Which episodes [B] have no assistive wrench."""
+    alone = jnp.ones(len(state.time), bool)
+    return alone if state.lift is None else state.lift == 0.0
+
+
 def verdict(state: EpisodeState, truncated: jax.Array, full_steps: jax.Array) -> dict:
     """Metrics of episodes that end at this step; NaN where one does not apply.
 
-    full_steps [B] is the length of the episode had it not ended early: the average return
-    rate is the cumulative task reward over it [P 6.4].
+    One that was cut short, or that had help, says nothing. full_steps [B] is the length of the
+    episode had it not ended early: the average return rate is the cumulative task reward over it
+    [P 6.4].
     """
     record = state.record
     success = (truncated & stands(record)).astype(jnp.float32)
     rise = jnp.maximum(record.rise_steps, 1)
     rose = record.rise_steps > 0
-    return {
+    found = {
         "success": jnp.where(state.kind == LYING, success, jnp.nan),
         "stand_success": jnp.where(state.kind == STANDING, success, jnp.nan),
         "clip_success": jnp.where(state.kind == CLIP, success, jnp.nan),
@@ -151,3 +164,7 @@ def verdict(state: EpisodeState, truncated: jax.Array, full_steps: jax.Array) ->
         "height_error_m": jnp.where(rose, record.height_error / rise, jnp.nan),
         "angle_error_rad": jnp.where(rose, record.angle_error / rise, jnp.nan),
     }
+    if state.until is None and state.lift is None:
+        return found
+    counts = runs_to_the_end(state) & is_alone(state)
+    return {name: jnp.where(counts, x, jnp.nan) for name, x in found.items()}

@@ -18,12 +18,7 @@ from getup_jax.core.types import Engine, StepOutput, take
 from getup_jax.envs.getup import rewards, terminations, user_rewards
 from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.curriculum import assistive_wrench, regions
-from getup_jax.envs.getup.curriculum.curriculum import (
-    Curriculum,
-    Draw,
-    is_alone,
-    runs_to_the_end,
-)
+from getup_jax.envs.getup.curriculum.curriculum import Curriculum, Draw
 from getup_jax.envs.getup.curriculum.state import CurriculumState
 from getup_jax.envs.getup.drawn_curves import Curve, style_curve
 from getup_jax.envs.getup.episode import EpisodeState, Record, recorded, verdict
@@ -239,16 +234,12 @@ class GetUpTask:
             truncated=truncated,
             terms=terms,
             ended=causes,
-            metrics={},
             episode=self._verdict(state, truncated),
         )
         return state, output
 
     def _verdict(self, state: EpisodeState, truncated: jax.Array) -> dict[str, jax.Array]:
         episode = verdict(state, truncated, self._full_steps(state))
-        if state.until is not None or state.lift is not None:
-            whole = runs_to_the_end(state) & is_alone(state)
-            episode = {name: jnp.where(whole, x, jnp.nan) for name, x in episode.items()}
         if state.region is None:
             return episode
         return episode | regions.by_region(episode, state.region)
@@ -306,8 +297,7 @@ class GetUpTask:
             terms["track"] = rewards.tracking(terms, curriculum.track_sharpness)
         if world.prior is None:  # nothing that offsets could be unnatural to [P 6.4]
             return terms
-        offset = config.offset_scale * state.action[:, self.latent_size :]
-        terms["natural"] = rewards.natural(offset, config.offset_limit_rad)
+        terms["natural"] = rewards.natural(self._offset(state), config.offset_limit_rad)
         terms["total"] = terms["total"] * terms["natural"]
         return terms
 
@@ -320,9 +310,13 @@ class GetUpTask:
             posture=posture,
             target=target,
             phase=state.time / state.duration,
-            offset=self.config.offset_scale * state.action[:, self.latent_size :],
+            offset=self._offset(state),
         )
         return user_rewards.terms(self.config.rewards, inputs)
+
+    def _offset(self, state: EpisodeState) -> jax.Array:
+        """Servo offsets [B, J] (rad) of the filtered actions."""
+        return self.config.offset_scale * state.action[:, self.latent_size :]
 
     def _full_steps(self, state: EpisodeState) -> jax.Array:
         """Steps [B] that an episode with this start has, if it does not end early."""

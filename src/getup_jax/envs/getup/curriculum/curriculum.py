@@ -22,7 +22,15 @@ from getup_jax.envs.getup.curriculum import (
 )
 from getup_jax.envs.getup.curriculum.state import CurriculumState
 from getup_jax.envs.getup.drawn_curves import Curve, Library, draw_curves
-from getup_jax.envs.getup.episode import CLIP, LYING, STANDING, EpisodeState, stands
+from getup_jax.envs.getup.episode import (
+    CLIP,
+    LYING,
+    STANDING,
+    EpisodeState,
+    is_alone,
+    runs_to_the_end,
+    stands,
+)
 from getup_jax.envs.getup.resets.pool import Pool
 
 _CURVES = 99  # folded into a key that is also split: none of its parts, which are 0, 1, 2, ...
@@ -199,15 +207,3 @@ def _evenly(
         place = jax.random.randint(key_style, (size,), 0, pool.startable.count[region])
         getup = pool.startable.styles[region, place]
     return getup, jax.random.randint(key_row, (size,), 0, rows)
-
-
-def runs_to_the_end(episode: EpisodeState) -> jax.Array:
-    """Which episodes [B] can end standing; one that is cut short says nothing about success."""
-    whole = jnp.ones(len(episode.time), bool)
-    return whole if episode.until is None else jnp.isinf(episode.until)
-
-
-def is_alone(episode: EpisodeState) -> jax.Array:
-    """Which episodes [B] have no assistive wrench."""
-    alone = jnp.ones(len(episode.time), bool)
-    return alone if episode.lift is None else episode.lift == 0.0
