@@ -7,7 +7,6 @@ import math
 
 import jax
 import jax.numpy as jnp
-from flax import struct
 
 from getup_jax.config import TaskConfig, TerrainConfig
 from getup_jax.core import device_axis
@@ -23,28 +22,14 @@ from getup_jax.envs.getup.curriculum.state import CurriculumState
 from getup_jax.envs.getup.drawn_curves import Curve, style_curve
 from getup_jax.envs.getup.episode import EpisodeState, Record, recorded, verdict
 from getup_jax.envs.getup.observation import Observer, Posture
-from getup_jax.envs.getup.resets.pool import Pool
 from getup_jax.envs.getup.user_rewards import RewardInputs
+from getup_jax.envs.getup.world import World
 from getup_jax.motion.getup import curves
 from getup_jax.physics.character import CharacterSpec
-from getup_jax.physics.terrain import Ground
-from getup_jax.pose_prior.prior import PosePrior
+
+__all__ = ["GetUpTask", "World"]
 
 _RESET_CHUNK = 32  # episodes that start anew at once; a step rarely ends more of some hundred
-
-
-@struct.dataclass
-class World:
-    """Every array that the task reads and training does not change."""
-
-    prior: PosePrior | None  # None: the action is the pose
-    pool: Pool
-    terrain: Ground
-    points: jax.Array  # [G, 9, 3] control points of the styles
-    duration: jax.Array  # [G] s
-    neutral_rotation: jax.Array  # [L - 1, 4] joint rotations of the neutral pose
-    target_lower: jax.Array  # [J] lowest PD target (rad)
-    target_upper: jax.Array  # [J]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
