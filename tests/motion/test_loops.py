@@ -70,15 +70,16 @@ def test_nothing_is_deep_in_the_floor_or_in_the_body(name, loops, humanoid):
         assert min((contact.dist for contact in data.contact), default=0.0) > -0.01
 
 
-def test_the_walk_advances_as_fast_as_its_feet_step(loops):
-    _, clip = loops["walk"]
+@pytest.mark.parametrize(("name", "speed"), [("walk", 1.25), ("crouch_walk", 0.72), ("run", 2.7)])
+def test_gaits_advance_straight_ahead(name, speed, loops):
+    _, clip = loops[name]
     advance = clip.qpos[-1, :3] - clip.qpos[0, :3]
-    assert 1.2 <= advance[0] / clip.duration <= 1.5
-    np.testing.assert_allclose(advance[1:], 0.0, atol=0.003)
+    np.testing.assert_allclose(advance, [speed * clip.duration, 0.0, 0.0], atol=0.003)
 
 
-def test_walking_always_has_a_foot_on_the_floor_and_sometimes_two(loops):
-    motion, _ = loops["walk"]
+@pytest.mark.parametrize("name", ["walk", "crouch_walk"])
+def test_walking_always_has_a_foot_on_the_floor_and_sometimes_two(name, loops):
+    motion, _ = loops[name]
     sides = [{contact[-1] for contact in key.planted} for key in motion.keyframes[:-1]]
     assert all(sides)
     assert any(len(side) == 2 for side in sides)
@@ -97,14 +98,31 @@ def test_the_squat_keeps_its_weight_over_the_feet(loops, humanoid):
     assert np.ptp(clip.qpos[:, 2]) > 0.25
 
 
-def test_jumps_fall_freely(loops, humanoid):
-    motion, clip = loops["jumping_jack"]
+def test_running_has_one_foot_on_the_floor_or_none(loops):
+    motion, clip = loops["run"]
+    sides = [{contact[-1] for contact in key.planted} for key in motion.keyframes[:-1]]
+    assert max(len(side) for side in sides) == 1
+    aloft = sum(b.time - a.time for a, b in itertools.pairwise(motion.keyframes) if a.airborne)
+    np.testing.assert_allclose(aloft, 0.2, atol=0.01)
+    assert clip.qpos[:, 2].max() < 0.9
+
+
+@pytest.mark.parametrize("name", ["leg_lunge", "crouch_walk"])
+def test_low_motions_are_low(name, loops):
+    _, clip = loops[name]
+    standing = loops["squat"][1].qpos[0, 2]
+    assert clip.qpos[:, 2].min() < standing - 0.15
+
+
+@pytest.mark.parametrize(("name", "flights"), [("jumping_jack", 2), ("run", 2)])
+def test_jumps_fall_freely(name, flights, loops, humanoid):
+    motion, clip = loops[name]
     centre = centres_of_mass(clip, humanoid)
     times = np.arange(len(centre)) / clip.fps
     keys = motion.keyframes
     air = [(a.time, b.time) for a, b in itertools.pairwise(keys) if a.airborne]
-    assert len(air) == 4  # two jumps of two parts each
-    for start, end in ((air[0][0], air[1][1]), (air[2][0], air[3][1])):
+    assert len(air) == 2 * flights  # of two parts each
+    for (start, _), (_, end) in zip(air[::2], air[1::2], strict=True):
         inside = np.flatnonzero((times > start - 0.01) & (times < end + 0.01))
         fall = np.diff(centre[inside], n=2, axis=0) * clip.fps**2
         np.testing.assert_allclose(fall, np.tile([0, 0, -9.81], (len(fall), 1)), atol=0.02)
