@@ -4,12 +4,16 @@ import mujoco
 import numpy as np
 import pytest
 
+from getup_jax.config import PhysicsConfig
 from getup_jax.core.resources import asset_path
 from getup_jax.motion.authoring.contact_ik import CONTACT_NAMES, Planter, geom_bottoms
 from getup_jax.motion.authoring.keyframes import authored_poses, load_authored, read_keyframes
-from getup_jax.motion.authoring.library import clip_features, read_drawn
+from getup_jax.motion.authoring.library import read_drawn
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.getup import curves
+from getup_jax.motion.getup.events import link_positions
+from getup_jax.motion.getup.getups import clip_features
+from getup_jax.physics.character import load_character
 
 NAMES = sorted(path.stem for path in asset_path("motions").glob("*.yaml"))
 DRAWN = sorted(path.stem for path in asset_path("curves").glob("*.yaml"))
@@ -20,11 +24,22 @@ def library(character):
     return {getup.name: getup for getup in load_authored(character)}
 
 
+def test_a_body_of_the_same_shapes_gets_the_same_arrays_read_only(library, character):
+    again = load_authored(load_character(PhysicsConfig(gain_scale=2.0)))
+    assert all(getup.points is library[getup.name].points for getup in again)
+    with pytest.raises(ValueError, match="read-only"):
+        again[0].points[0, 0] = 0.0
+    again.clear()
+    assert len(load_authored(character)) == 28
+
+
 @pytest.fixture(scope="module")
 def shapes(library, character):
     """Features [F, 3] of every reference motion."""
-    clips = [library[name].clip for name in NAMES]
-    return dict(zip(NAMES, clip_features(clips, character), strict=True))
+    return {
+        name: clip_features(link_positions(library[name].clip, character), character)
+        for name in NAMES
+    }
 
 
 @pytest.fixture(scope="module")

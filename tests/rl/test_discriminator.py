@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -50,6 +52,29 @@ def test_penalty_of_a_linear_ensemble():
     # held at a quarter, gradients are four times as far up
     found = gradient_penalty(lambda x: x.reshape(len(x), -1) @ heads, pairs, norm=0.25)
     assert_allclose(found, (4.0 * norm - 1.0) ** 2, rtol=1e-5)
+
+
+def test_a_share_of_the_mixtures_gives_the_same_penalty_for_less():
+    """It is that of the first rows, which are shuffled; the hinge loss is that of all."""
+    rng = np.random.default_rng(1)
+    pairs = Pairs(
+        fake=jnp.asarray(rng.normal(size=(8, F, D)), jnp.float32),
+        real=jnp.asarray(rng.normal(size=(8, F, D)), jnp.float32),
+        share=jnp.linspace(0.0, 1.0, 8),
+        head=jnp.arange(8, dtype=jnp.int32),
+    )
+    config = dataclasses.replace(CONFIG, penalty_of="head", penalty_share=0.25)
+    discriminator = Discriminator(config)
+    variables = discriminator.init(jax.random.PRNGKey(0), F, D).variables
+    _, found = discriminator._loss(variables, pairs)
+    two = jax.tree.map(lambda x: x[:2], pairs)
+    _, of_two = Discriminator(dataclasses.replace(config, penalty_share=1.0))._loss(variables, two)
+    _, of_all = Discriminator(dataclasses.replace(config, penalty_share=1.0))._loss(
+        variables, pairs
+    )
+    assert_allclose(found["penalty"], of_two["penalty"], rtol=1e-5)
+    assert found["penalty"] != of_all["penalty"]
+    assert_allclose(found["real"], of_all["real"], rtol=1e-5)
 
 
 def test_penalty_is_taken_between_the_windows():

@@ -52,6 +52,8 @@ class DiscriminatorConfig:
     # whose gradient is held at 1: sum, that of all heads together, as in the authors' release: the
     # mean of N heads then changes by at most 1 / N a unit of distance | head, each, as equation 2
     penalty_of: str = "sum"
+    # share of an update's mixtures that it is taken at: its gradients are most of the cost
+    penalty_share: float = number(1.0, above=0, most=1)
     # that norm; less than 1: the score still tells apart what is far from the clips
     gradient_norm: float = number(1.0, above=0, most=1000)
     learning_rate: float = number(1e-5, above=0, most=1)  # of Adam

@@ -6,7 +6,6 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.config import ConfigError
@@ -73,7 +72,7 @@ def _draw_curves(axes: Any, result: Episodes, episode: int) -> None:
     start, duration = trace.time[0, episode], trace.duration[0, episode]
     time = start + env.engine.control_dt * np.arange(len(mean))
     goal_time = np.linspace(start, duration + env.config.stand_time_s, 200)
-    target = curves.basis(jnp.asarray(goal_time / duration)) @ result.styles[style].points * _SCALE
+    target = curves.basis(goal_time / duration) @ result.styles[style].points * _SCALE
     for row, axis in enumerate(axes):
         axis.fill_between(time, low[:, row], high[:, row], alpha=0.3, label="10 to 90 %")
         axis.plot(time, mean[:, row], label="achieved, mean")

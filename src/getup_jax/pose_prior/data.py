@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-import jax.numpy as jnp
 import mujoco
 import numpy as np
 
@@ -99,8 +98,8 @@ def split(group: np.ndarray, holdout: float, seed: int) -> tuple[np.ndarray, np.
 
 def pose_conditions(poses: np.ndarray, character: CharacterSpec) -> np.ndarray:
     """Features [N, 3] of poses [N, 7 + J] that stand, sit or lie on the ground z = 0."""
-    positions = jnp.asarray(link_positions(poses, character))
-    return np.asarray(features(FeatureLinks.of(character), positions, 0.0), np.float32)
+    positions = link_positions(poses, character)
+    return features(FeatureLinks.of(character), positions, 0.0).astype(np.float32)
 
 
 def link_positions(poses: np.ndarray, character: CharacterSpec) -> np.ndarray:

@@ -112,11 +112,14 @@ class Discriminator:
             output: Any = self.model.apply(variables, x)
             return output
 
-        fake, real = ensemble(pairs.fake), ensemble(pairs.real)
+        both = ensemble(jnp.concatenate([pairs.fake, pairs.real]))
+        fake, real = jnp.split(both, 2)
         hinge = hinge_loss(fake, real)
         config = self.config
+        some = max(1, round(config.penalty_share * len(fake)))  # of rows that are shuffled
+        mixtures = jax.tree.map(lambda x: x[:some], pairs)
         penalty = gradient_penalty(
-            ensemble, pairs, each=config.penalty_of == "head", norm=config.gradient_norm
+            ensemble, mixtures, each=config.penalty_of == "head", norm=config.gradient_norm
         )
         loss = hinge + config.gradient_penalty * penalty
         metrics = {

@@ -184,4 +184,4 @@ def _neutral_rotation(character: CharacterSpec, observer: Observer) -> jnp.ndarr
     data = mujoco.MjData(character.model)
     data.qpos[:] = character.neutral_qpos
     mujoco.mj_kinematics(character.model, data)
-    return observer.joint_rotation(jnp.asarray(data.xquat[1:], jnp.float32))
+    return jax.jit(observer.joint_rotation)(np.asarray(data.xquat[1:], np.float32))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import mujoco
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -50,8 +49,7 @@ def _reference(
         return Reference(getup.clip, np.zeros(len(getup.clip.qpos)))
     if not clips:
         return None
-    s = jnp.linspace(0.0, 1.0, SAMPLES)
-    curve = np.asarray(curves.evaluate(jnp.asarray(getup.points), s))
+    curve = curves.evaluate(getup.points, np.linspace(0.0, 1.0, SAMPLES))
     warps = [warp(curve, value) for value in values]
     best = int(np.argmin([cost for _, cost in warps]))
     qpos = between_frames(clips[best], uniform_filter1d(warps[best][0].astype(float), _SMOOTH))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 FEATURE_SCALE = np.array([0.1, 0.35, 0.35])  # m, rad, rad: gaps of this size count alike
 _FASTEST = 4.0  # times the even pace that a warp may run through the motion
@@ -27,12 +28,13 @@ def warp(curve: np.ndarray, clip: np.ndarray) -> tuple[np.ndarray, float]:
     total = np.full(gap.shape, np.inf)  # cost of the best way to a frame
     taken = np.zeros(gap.shape, int)  # its last step
     total[0, 0] = gap[0, 0]
+    padded = np.full(len(steps) - 1 + len(clip), np.inf)  # nothing comes before the first frame
+    before = sliding_window_view(padded, len(steps))[:, ::-1]  # [F, S] cost of S steps ago
     for row in range(1, len(curve)):
-        before = np.full((len(steps), len(clip)), np.inf)
-        for step in steps[: len(clip)]:
-            before[step, step:] = total[row - 1, : len(clip) - step] + price[step]
-        taken[row] = before.argmin(axis=0)
-        total[row] = gap[row] + before.min(axis=0)
+        padded[len(steps) - 1 :] = total[row - 1]
+        cost = before + price
+        taken[row] = cost.argmin(axis=1)
+        total[row] = gap[row] + cost.min(axis=1)
     frames = np.empty(len(curve), int)
     frames[-1] = len(clip) - 1
     for row in range(len(curve) - 1, 0, -1):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.motion.clips import Clip, GetUp, MotionError
@@ -21,8 +20,6 @@ from getup_jax.motion.getup.events import (
 from getup_jax.motion.getup.strategies import classify
 from getup_jax.physics.character import CharacterSpec
 
-# JAX compiles once for each shape, so that frames travel in blocks of one size.
-_BLOCK = 256
 _SAMPLES = 512
 FLAT_M = 0.16  # the neck is .11 m high on a body that lies flat, and .22 m with the head raised
 
@@ -51,33 +48,26 @@ def cut_getup(
     name = name or f"{clip.name}:{start}-{stand}"
     part = Clip(name, clip.fps, clip.qpos[start : stand + 1].copy(), clip.source)
     positions = link_positions(part, character)
-    points, error = curves.fit(_even(clip_features(positions, character)))
+    points, error = curves.fit(evenly(clip_features(positions, character), _SAMPLES))
     strategy = classify(positions, part.fps, character)
     return GetUp(name, part.duration, points, part, strategy, error)
 
 
 def clip_features(positions: np.ndarray, character: CharacterSpec) -> np.ndarray:
     """Height and angles [F, 3] over flat ground, of link positions [F, L, 3]."""
-    blocks = -(-len(positions) // _BLOCK)
-    padded = np.pad(positions, ((0, blocks * _BLOCK - len(positions)), (0, 0), (0, 0)), "edge")
-    links = FeatureLinks.of(character)
-    parts = [
-        np.asarray(features(links, jnp.asarray(padded[i * _BLOCK : (i + 1) * _BLOCK]), 0.0))
-        for i in range(blocks)
-    ]
-    return np.concatenate(parts)[: len(positions)].astype(np.float64)
+    return features(FeatureLinks.of(character), np.asarray(positions, np.float64), 0.0)
 
 
-def _even(values: np.ndarray) -> np.ndarray:
-    """Samples [F, D] at _SAMPLES equal steps of the same duration, the ends unchanged."""
-    old, new = np.linspace(0, 1, len(values)), np.linspace(0, 1, _SAMPLES)
+def evenly(values: np.ndarray, count: int) -> np.ndarray:
+    """Samples [F, D] at `count` equal steps of the same duration [count, D], the ends unchanged."""
+    old, new = np.linspace(0, 1, len(values)), np.linspace(0, 1, count)
     return np.stack([np.interp(new, old, column) for column in values.T], axis=1)
 
 
 def flat_time(getup: GetUp) -> float:
     """Seconds for which the curve asks for a body so low that its head is on the floor."""
-    height = curves.evaluate(jnp.asarray(getup.points), jnp.linspace(0.0, 1.0, _SAMPLES))[:, 0]
-    return getup.duration * float(jnp.mean(height < FLAT_M))
+    height = curves.evaluate(getup.points, np.linspace(0.0, 1.0, _SAMPLES))[:, 0]
+    return getup.duration * float(np.mean(height < FLAT_M))
 
 
 def find_getups(

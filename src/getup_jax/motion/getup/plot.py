@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.motion.clips import GetUp, MotionError
@@ -87,9 +86,9 @@ def strategy_curves(getups: Sequence[GetUp], character: CharacterSpec) -> dict[s
 
 def class_curves(getups: Sequence[GetUp]) -> dict[str, np.ndarray]:
     """{strategy: curves [n, 101, 3] over the phase}, in the plot's units."""
-    points = jnp.asarray(np.stack([getup.points for getup in getups]))
-    weights = curves.basis(jnp.asarray(_PHASE))
-    values = np.asarray(jnp.einsum("sp,gpd->gsd", weights, points)) * _SCALE
+    points = np.stack([getup.points for getup in getups])
+    weights = curves.basis(_PHASE)
+    values = np.einsum("sp,gpd->gsd", weights, points) * _SCALE
     names = [getup.strategy or "unclassified" for getup in getups]
     return {
         name: values[[i for i, other in enumerate(names) if other == name]]
@@ -108,7 +107,7 @@ def _draw_class(row: Any, name: str, values: np.ndarray) -> None:
 
 
 def _draw_fit(row: Any, getup: GetUp, character: CharacterSpec) -> None:
-    fitted = np.asarray(curves.basis(jnp.asarray(_PHASE))) @ getup.points * _SCALE
+    fitted = curves.basis(_PHASE) @ getup.points * _SCALE
     knots = np.linspace(0.0, getup.duration, len(getup.points))
     for column, axis in enumerate(row):
         axis.plot(_PHASE * getup.duration, fitted[:, column], label="spline")

@@ -264,7 +264,7 @@ def angle_gap(qpos: np.ndarray, getup: GetUp, character: CharacterSpec) -> float
     data = mujoco.MjData(character.model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(character.model, data)
-    value = np.asarray(features(FeatureLinks.of(character), jnp.asarray(data.xpos[1:]), 0.0))
+    value = features(FeatureLinks.of(character), data.xpos[1:], 0.0)
     return float(np.abs(value[1:] - getup.points[0, 1:]).max())
 
 
