@@ -52,7 +52,7 @@ def measure(name: str) -> list[dict[str, float | None]]:
         pass
 
     job = build_job(config, log)
-    state = job.learner.init(job.world, jax.random.PRNGKey(config.seed))
+    state = jax.jit(job.learner.init)(job.world, jax.random.PRNGKey(config.seed))
     iterate, found = jax.jit(job.learner.iteration), []
     for _ in range(ITERATIONS):
         state, metrics = iterate(job.world, state)

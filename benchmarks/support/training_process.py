@@ -37,7 +37,7 @@ def main() -> None:
     setting = json.loads(args.setting)
     config = make_config(argparse.Namespace(engine=None, **setting), _silent)
     job = build_job(config, _silent)
-    state = job.learner.init(job.world, jax.random.PRNGKey(config.seed))
+    state = jax.jit(job.learner.init)(job.world, jax.random.PRNGKey(config.seed))
     parameters = (state.learner.policy.actor, state.learner.critic)
     sizes = [sum(np.size(x) for x in jax.tree.leaves(part)) for part in parameters]
     iteration, world, state = spread(job.learner, job.world, state)

@@ -124,14 +124,14 @@ def test_the_actor_learns_the_old_targets(task, old, monkeypatch):
     learner, policy = make_policy(task, CONFIG)
     log: list[str] = []
     teacher = teacher_of(learner, policy, old)
-    taught = carry_over(learner, task.world, policy, teacher, KEY, log.append)
+    distilled = carry_over(learner, task.world, policy, teacher, KEY, log.append)
     after, before, _ = differences(log)
     assert after < 0.3 * before
     block = learner.env.observer.slices()["action"]
     kept = np.ones(learner.env.observation_size, bool)
     kept[block] = False
     for name in ("mean", "variance"):
-        a, b = getattr(policy.statistics, name), getattr(taught.statistics, name)
+        a, b = getattr(policy.statistics, name), getattr(distilled.statistics, name)
         np.testing.assert_array_equal(a[kept], b[kept])
         assert (a[block] != b[block]).any()
 
@@ -201,12 +201,12 @@ def test_a_policy_is_distilled_into_networks_with_and_without_mirror_images(
     policy = dataclasses.replace(policy, actor=actor)
     teacher = teacher_of(taught_before, policy, learner.env.decoder(mirrored.world))
     log: list[str] = []
-    taught = carry_over(learner, mirrored.world, own, teacher, KEY, log.append)
+    distilled = carry_over(learner, mirrored.world, own, teacher, KEY, log.append)
     after, before, _ = differences(log)
     assert after < 0.5 * before
     if not was_mirrored:
         image = mirrored.environment.symmetry.observation
-        np.testing.assert_allclose(image(taught.statistics.mean), taught.statistics.mean, atol=1e-5)
+        np.testing.assert_allclose(image(distilled.statistics.mean), distilled.statistics.mean, atol=1e-5)
 
 
 def loaded_from(folder, task: BuiltTask, config: Config) -> LoadedPolicy:
@@ -300,12 +300,12 @@ def test_other_sizes_that_see_more_of_the_curve_are_distilled_into(tmp_path, tas
     teacher = make_teacher(LONGER, learner, built.world, loaded, own)
     log: list[str] = []
     teacher = dataclasses.replace(teacher, policy=observed(teacher.policy, make_policy(task)[0]))
-    taught = carry_over(learner, built.world, own, teacher, KEY, log.append)
+    distilled = carry_over(learner, built.world, own, teacher, KEY, log.append)
     after, before, _ = differences(log)
     assert len(log) == 3
     assert after < before
     # What both see has the statistics of the old one.
-    old, new = teacher.policy.statistics.mean, taught.statistics.mean
+    old, new = teacher.policy.statistics.mean, distilled.statistics.mean
     block = learner.env.observer.slices()["targets"]
     kept = [0, 1, 2, 6, 7, 8, 9, 10, 11, 12, 13, 14]
     np.testing.assert_array_equal(new[block][np.array(kept)], old[block.start : block.start + 12])

@@ -57,7 +57,7 @@ def gap(a: Any, b: Any, least: float = 1e-12) -> float:
 def same_samples() -> dict[str, float]:
     """How far the state is from one device's after two iterations with the same samples."""
     learner, world = probe_learner()
-    state = learner.init(world, jax.random.PRNGKey(0))
+    state = jax.jit(learner.init)(world, jax.random.PRNGKey(0))
     state, _ = jax.jit(learner.iteration)(world, state)  # the first one only collects statistics
     collected = jax.jit(learner.collect)(world, state)
     alone, metrics = jax.jit(learner.learn)(world, state, collected)
@@ -109,7 +109,7 @@ def composite_run(number: int) -> dict[str, Any]:
 def two_iterations(learner: Learner, of_one: Any, number: int) -> dict[str, Any]:
     """What is seen of them, from the same simulations in each device's part."""
     placement = place(learner, of_one, jax.devices()[:number])
-    state = learner.init(of_one, jax.random.PRNGKey(0))
+    state = jax.jit(learner.init)(of_one, jax.random.PRNGKey(0))
     state = placement.put_state(_repeated(state, placement, number))
     world = placement.put_world(of_one)
     step = jax.jit(placement.spread(learner.iteration), donate_argnums=1)

@@ -22,9 +22,9 @@ CONFIG = Config(ppo=PPOConfig(num_envs=12, num_steps=4, minibatch_size=24))
 
 
 def composite(minibatch_size: int) -> Config:
-    judge = DiscriminatorConfig(minibatch_size=minibatch_size)
+    discriminator = DiscriminatorConfig(minibatch_size=minibatch_size)
     groups = {"all": GroupConfig(links=("all",))}
-    composite = CompositeConfig(groups=groups, discriminator=judge)
+    composite = CompositeConfig(groups=groups, discriminator=discriminator)
     return dataclasses.replace(CONFIG, composite=composite)
 
 

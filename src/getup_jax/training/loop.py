@@ -66,7 +66,7 @@ class Loop:
         self._config, self._job, self._display = config, job, display
         self._checkpoints = folder / checkpoint.CHECKPOINTS
         self._world = jax.device_put(job.world)
-        self._state = job.learner.init(self._world, jax.random.PRNGKey(config.seed))
+        self._state = jax.jit(job.learner.init)(self._world, jax.random.PRNGKey(config.seed))
         self.done = 0  # iterations
         self.saved: Path | None = None  # newest checkpoint
         if checkpoint.steps(self._checkpoints):

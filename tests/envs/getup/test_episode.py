@@ -20,7 +20,7 @@ from getup_jax.envs.getup.episode import (
 
 # compiled once; operation by operation takes far longer
 update = jax.jit(update_record)
-judge = jax.jit(verdict)
+verdict_of = jax.jit(verdict)
 
 
 def updated(record: Record, height: float, standing: bool, time_left: float, **changes) -> Record:
@@ -100,7 +100,7 @@ def test_a_verdict_goes_to_the_kind_of_its_start():
         record, tall, tall, jnp.full(3, 2.0), jnp.full(3, 0.1), jnp.ones(3, bool), jnp.full(3, 0.5)
     )
     state = state_of(record, [LYING, STANDING, CLIP])
-    result = judge(state, jnp.array([True, True, False]), full_steps=jnp.array([1.0, 1.0, 10.0]))
+    result = verdict_of(state, jnp.array([True, True, False]), full_steps=jnp.array([1.0, 1.0, 10.0]))
     np.testing.assert_array_equal(result["success"], [1.0, np.nan, np.nan])
     np.testing.assert_array_equal(result["stand_success"], [np.nan, 1.0, np.nan])
     # it stands, but was not truncated: it ended early
@@ -116,7 +116,7 @@ def test_errors_are_means_over_the_rise():
     record = updated(Record.empty(1), 0.5, False, 5.0, target=0.4, angles=(1.5, 1.3))
     record = updated(record, 0.9, False, 4.0, target=1.2, angles=(1.1, 1.5))
     record = updated(record, 0.1, True, 2.0)
-    result = judge(state_of(record, [LYING]), jnp.array([False]), jnp.array([3.0]))
+    result = verdict_of(state_of(record, [LYING]), jnp.array([False]), jnp.array([3.0]))
     assert float(result["height_error_m"][0]) == pytest.approx(0.2)
     assert float(result["angle_error_rad"][0]) == pytest.approx(0.15)
     assert float(result["success"][0]) == 0.0

@@ -50,7 +50,7 @@ class Keyframe:
 
     time: float  # s
     qpos: np.ndarray  # [7 + J]
-    planted: tuple[str, ...]  # planting.CONTACT_NAMES that stay put until the next one
+    planted: tuple[str, ...]  # contact_ik.CONTACT_NAMES that stay put until the next one
     note: str = ""
     airborne: bool = False  # flies freely until the next one
 

@@ -15,7 +15,7 @@ from getup_jax.core import device_axis
 from getup_jax.core.masked_update import running_mean
 from getup_jax.physics.terrain_map import REGIONS
 
-_RATE = 0.01  # share of an episode's result in its region's running success
+_RATE = 0.01  # share of an episode's result in its region's success rate
 
 
 @struct.dataclass
@@ -25,7 +25,7 @@ class RegionProgress:
     opened: jax.Array  # [] int32 regions that are open, the first ones of REGIONS
     successes: jax.Array  # [] int32 in the newest of them, since it opened
     steps: jax.Array  # [] int32 steps of the whole batch
-    rate: jax.Array  # [R] running success of the episodes that began lying in each region
+    rate: jax.Array  # [R] success rate of the episodes that began lying in each region
 
 
 def first(config: TerrainConfig) -> RegionProgress:

@@ -21,7 +21,7 @@ RATE = 0.1  # share of an episode's result in its cell's running mean
 
 
 def first(pool: Pool) -> jax.Array:
-    """Running success [3 R, G, BINS] before any episode: none."""
+    """Success rate [3 R, G, BINS] before any episode: none."""
     kinds, regions, styles, _ = pool.table.shape
     return jnp.zeros((kinds * regions, styles, BINS), jnp.float32)
 
