@@ -6,8 +6,9 @@ CONFIG ?= configs/flat.yaml
 ARGS   ?=
 JAX    ?=
 
-# two processes, each with whole files: what a file's tests compile they share
-PARALLEL := -n 2 --dist loadfile
+# two processes, each with whole files: what a file's tests compile they share. In the order of
+# tests/conftest.py, so that no long file begins when the other process has nothing left to do
+PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder
 
 BIN   := $(VENV)/bin
 STAMP := $(VENV)/.installed

@@ -8,6 +8,7 @@ import contextlib
 import importlib
 import os
 import sys
+from collections import Counter
 from collections.abc import Iterator
 
 import pytest
@@ -18,6 +19,14 @@ if os.environ["JAX_PLATFORMS"] == "cpu":
     os.environ.setdefault("XLA_FLAGS", quick)
 if sys.platform == "linux" and "DISPLAY" not in os.environ:
     os.environ.setdefault("MUJOCO_GL", "egl")
+
+
+@pytest.hookimpl(trylast=True)  # when -m has taken its share
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files of few tests first: they are the ones that compile for a minute."""
+    count = Counter(item.path for item in items)
+    items.sort(key=lambda item: count[item.path])
+
 
 _MANY = 6_000  # memory maps of a process; every compiled program has some
 
