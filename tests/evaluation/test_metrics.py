@@ -19,8 +19,8 @@ KEYS = {
     "success", "success_low", "success_high", "return_rate", "return_rate_total",
     "height_error_m", "angle_error_rad",
     "stand_time_s", "jitter", "torque_nm", "energy_j", "saturation", "offset_rad", "foot_slip_m_s",
-    "penetration_m", "penetration_max_m", "success_pushed", "episodes", "per_orientation",
-    "per_curve", "per_region", "per_ground",
+    "penetration_m", "penetration_max_m", "reference_error_m", "success_pushed", "episodes",
+    "per_orientation", "per_curve", "per_region", "per_ground",
 }  # fmt: skip
 GROUPS = {"per_orientation", "per_curve", "per_region", "per_ground"}
 STEP_VALUES = ("torque", "power", "jerk", "saturation", "offset", "slip", "penetration")
@@ -170,7 +170,7 @@ def test_the_deepest_overlap_is_the_largest_of_all_episodes():
     running = np.array([[1, 1], [1, 0]])
     trace = make_trace(np.ones((2, 2)), running, penetration=depth)
     np.testing.assert_allclose(values(trace)["penetration_max_m"], [0.01, 0.002])
-    scores = score(trace, np.array([0, 1]), styles("a", "b"), DT, STAND_S)
+    scores = score(values(trace), np.array([0, 1]), styles("a", "b"))
     assert scores.penetration_max_m == pytest.approx(0.01)
     assert scores.penetration_m == pytest.approx(0.006)
     assert scores.per_curve["b"].penetration_max_m == pytest.approx(0.002)
@@ -191,7 +191,7 @@ def test_success_of_pushed_episodes_leaves_the_others_out():
 def test_scores_are_means_by_style_and_in_total():
     heights = np.tile([0.9, 0.8, 0.6, 1.0], (2, 1))
     trace = make_trace(heights, success=np.array([True, False, True, True]))
-    scores = score(trace, np.array([0, 1, 0, 1]), styles("a", "b", "unused"), DT, STAND_S)
+    scores = score(values(trace), np.array([0, 1, 0, 1]), styles("a", "b", "unused"))
     assert scores.success == pytest.approx(0.75)
     assert scores.episodes == 4
     assert scores.height_error_m == pytest.approx(0.175)
@@ -209,17 +209,17 @@ def test_scores_by_the_way_of_lying():
         style.points[0, 1:] = side, front
     trace = make_trace(np.ones((3, 5)), success=np.array([True, False, True, False, True]))
     style = np.array([0, 1, 2, 3, 0])
-    scores = score(trace, style, lying, DT, STAND_S)
+    scores = score(values(trace), style, lying)
     found = {name: (x.episodes, x.success) for name, x in scores.per_orientation.items()}
     assert found == {"supine": (2, 1.0), "prone": (1, 0.0), "side": (2, 0.5)}
-    assert score(trace, style, lying, DT, STAND_S, STANDING).per_orientation is None
+    assert score(values(trace), style, lying, STANDING).per_orientation is None
 
 
 def test_the_total_return_rate_counts_long_episodes_for_more():
     # of full episodes of 4 and 2 steps, all of the first and half of the second
     trace = make_trace(np.ones((4, 2)), np.array([[1, 1], [1, 0], [1, 0], [1, 0]]))
     trace.duration[:, 1] = 0.0
-    scores = score(trace, np.array([0, 1]), styles("long", "short"), DT, STAND_S)
+    scores = score(values(trace), np.array([0, 1]), styles("long", "short"))
     assert scores.return_rate == pytest.approx((4 / 4 + 1 / 2) / 2)
     assert scores.return_rate_total == pytest.approx((4 + 1) / (4 + 2))
     assert scores.per_curve["short"].return_rate_total == pytest.approx(1 / 2)
@@ -230,7 +230,7 @@ def test_scores_by_region_and_kind_of_ground():
     region = np.array(["flat", "flat", "hard", "easy"])
     kind = np.array(["flat ground", "flat ground", "slope 20-30°", "rough"])
     places = Places(region, kind)
-    scores = score(trace, np.zeros(4, int), styles("a"), DT, STAND_S, places=places)
+    scores = score(values(trace), np.zeros(4, int), styles("a"), places=places)
     grounds = {name: (x.episodes, x.success) for name, x in scores.per_ground.items()}
     assert grounds == {"flat ground": (2, 0.5), "rough": (1, 0.0), "slope 20-30°": (1, 1.0)}
     found = {name: (x.episodes, x.success) for name, x in scores.per_region.items()}
@@ -244,7 +244,7 @@ def test_scores_by_region_and_kind_of_ground():
 
 def test_json_has_every_score_and_no_nan():
     trace = make_trace(np.full((3, 2), 0.5), success=False)
-    result = to_json(score(trace, np.array([0, 1]), styles("a", "b"), DT, STAND_S))
+    result = to_json(score(values(trace), np.array([0, 1]), styles("a", "b")))
     assert set(result) == KEYS
     assert set(result["per_curve"]) == {"a", "b"}
     assert set(result["per_curve"]["a"]) == KEYS - GROUPS
@@ -267,7 +267,7 @@ def rows_of(text: str) -> dict[str, list[str]]:
 def test_the_tables_have_a_row_a_style_a_way_of_lying_and_one_in_total():
     trace = make_trace(np.ones((3, 3)), success=np.array([True, True, False]))
     trace.slip[:] = 0.123
-    text = table(score(trace, np.array([0, 0, 1]), styles("fast", "slow"), DT, STAND_S))
+    text = table(score(values(trace), np.array([0, 0, 1]), styles("fast", "slow")))
     rows = rows_of(text)
     assert list(rows) == ["fast", "slow", "supine", "all"]
     assert "100%" in rows["fast"][0]
@@ -282,6 +282,6 @@ def test_the_table_tells_of_pushes_where_there_were_some():
     pushed = np.zeros((3, 2), bool)
     pushed[1] = True
     trace = make_trace(np.ones((3, 2)), success=np.array([True, False]), pushed=pushed)
-    text = table(score(trace, np.array([0, 0]), styles("a"), DT, STAND_S))
+    text = table(score(values(trace), np.array([0, 0]), styles("a")))
     assert "of pushed" in text
     assert rows_of(text)["a"][0].count("50%") == 2  # of all, and of pushed

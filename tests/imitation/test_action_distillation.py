@@ -206,7 +206,8 @@ def test_a_policy_is_distilled_into_networks_with_and_without_mirror_images(
     assert after < 0.5 * before
     if not was_mirrored:
         image = mirrored.environment.symmetry.observation
-        np.testing.assert_allclose(image(distilled.statistics.mean), distilled.statistics.mean, atol=1e-5)
+        mean = distilled.statistics.mean
+        np.testing.assert_allclose(image(mean), mean, atol=1e-5)
 
 
 def loaded_from(folder, task: BuiltTask, config: Config) -> LoadedPolicy:

@@ -20,7 +20,8 @@ from getup_jax.envs.getup.task import GetUpTask
 from getup_jax.evaluation import control_gain
 from getup_jax.evaluation.control_gain import ControlGain
 from getup_jax.evaluation.ground_kinds import Places
-from getup_jax.evaluation.metrics import Scores, score
+from getup_jax.evaluation.metrics import Scores, episode_values, score
+from getup_jax.evaluation.reference_error import reference_errors
 from getup_jax.evaluation.rollout import Episodes, run_episodes
 from getup_jax.evaluation.scenario import (
     DROPPED,
@@ -64,17 +65,19 @@ def evaluate(loaded: LoadedPolicy, scenario: Scenario, display: Display) -> tupl
         plan = plan.on_regions(task.world.pool)
     display.log("compiling the episode ...")
     episodes = run_episodes(task, learner, policy, plan, Rate(display, number))
-    control_dt = task.environment.engine.control_dt
-    scores = score(
-        episodes.trace,
-        plan.getup,
-        task.getups,
-        control_dt,
-        config.task.stand_time_s,
-        scenario.kind,
-        _places(config, task, plan),
-    )
+    places = _places(config, task, plan)
+    scores = score(_values(episodes), plan.getup, task.getups, scenario.kind, places)
     return episodes, scores
+
+
+def _values(episodes: Episodes) -> dict[str, np.ndarray]:
+    """What there is to say of every episode [N]."""
+    env, trace, plan = episodes.task.environment, episodes.trace, episodes.plan
+    values = episode_values(trace, env.engine.control_dt, env.config.stand_time_s)
+    if plan.points is not None:  # other curves than those of the motions
+        return values
+    errors = reference_errors(trace, plan.getup, episodes.task.getups, env.character)
+    return values | {"reference_error_m": errors}
 
 
 def _places(config: Config, task: BuiltTask, plan: Plan) -> Places | None:

@@ -41,6 +41,7 @@ class Scores:
     foot_slip_m_s: float  # mean horizontal speed of the feet's points on the ground
     penetration_m: float  # mean over looks at the deepest overlap of two links
     penetration_max_m: float  # deepest overlap of all
+    reference_error_m: float  # mean distance of a link to the style's own motion, time warped
     success_pushed: float  # share of success among the episodes that were pushed
     episodes: int
     per_orientation: dict[str, Scores] | None = None  # supine, prone, side: how the curve starts
@@ -50,20 +51,17 @@ class Scores:
 
 
 def score(
-    trace: Any,
+    values: dict[str, np.ndarray],
     getup: np.ndarray,
     getups: Sequence[GetUp],
-    control_dt: float,
-    stand_time_s: float,
     kind: int = LYING,
     places: Places | None = None,
 ) -> Scores:
-    """Scores of a trace (see `episodes.Trace`, NumPy leaves [T, N, ...]).
+    """Scores of episodes, of what `episode_values` says of each [N], and their styles [N].
 
     In total, by style, for lying starts by how the body lies, and on irregular ground by region
     and kind of ground.
     """
-    values = episode_values(trace, control_dt, stand_time_s)
     styles = np.array([style.name for style in getups])[getup]
     lies = np.array([orientation(style) for style in getups])[getup]
     return dataclasses.replace(
@@ -87,7 +85,10 @@ def _split(
 
 
 def episode_values(trace: Any, control_dt: float, stand_time_s: float) -> dict[str, np.ndarray]:
-    """One number an episode [N] of everything that `Scores` is made of."""
+    """One number an episode [N] of everything that `Scores` is made of.
+
+    Of a trace as `rollout.Trace`, with NumPy leaves [T, N, ...].
+    """
     running, rising = trace.running, trace.running & (trace.time <= trace.duration)
     error = np.abs(trace.features - trace.target)
     success = trace.success.any(axis=0)
@@ -110,6 +111,7 @@ def episode_values(trace: Any, control_dt: float, stand_time_s: float) -> dict[s
         "foot_slip_m_s": _masked_mean(trace.slip, running),
         "penetration_m": _masked_mean(trace.penetration, running),
         "penetration_max_m": _masked_max(trace.penetration, running),
+        "reference_error_m": np.full(len(success), np.nan),  # see reference_error.py
         "success_pushed": np.where((trace.pushed & running).any(axis=0), success, np.nan),
     }
 

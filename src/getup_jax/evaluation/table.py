@@ -32,6 +32,7 @@ _NATURALNESS = (
     ("foot_slip_m_s", "foot slip m/s", "{:.3f}"),
     ("penetration_m", "overlap m", "{:.4f}"),
     ("penetration_max_m", "deepest m", "{:.3f}"),
+    ("reference_error_m", "from the motion m", "{:.3f}"),
 )
 _Columns = tuple[tuple[str, str, str], ...]
 

@@ -100,7 +100,9 @@ def test_a_verdict_goes_to_the_kind_of_its_start():
         record, tall, tall, jnp.full(3, 2.0), jnp.full(3, 0.1), jnp.ones(3, bool), jnp.full(3, 0.5)
     )
     state = state_of(record, [LYING, STANDING, CLIP])
-    result = verdict_of(state, jnp.array([True, True, False]), full_steps=jnp.array([1.0, 1.0, 10.0]))
+    result = verdict_of(
+        state, jnp.array([True, True, False]), full_steps=jnp.array([1.0, 1.0, 10.0])
+    )
     np.testing.assert_array_equal(result["success"], [1.0, np.nan, np.nan])
     np.testing.assert_array_equal(result["stand_success"], [np.nan, 1.0, np.nan])
     # it stands, but was not truncated: it ended early
