@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import subprocess
 import sys
+from collections.abc import Iterator
+from types import FrameType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,8 +38,32 @@ def test_a_shipped_policy_gets_up_in_whole_episodes(policy):
     assert ended.mean() > 0.9
 
 
+@contextlib.contextmanager
+def settings_are_handed_to(files: set[str]) -> Iterator[None]:
+    """Adds every file of the package, outside config/, a function of which is given settings."""
+
+    def watch(frame: FrameType, event: str, _: Any) -> None:
+        path = frame.f_code.co_filename.partition("/src/getup_jax/")[2]
+        if event != "call" or not path or path.startswith("config/"):
+            return
+        count = frame.f_code.co_argcount + frame.f_code.co_kwonlyargcount
+        given = [frame.f_locals.get(n) for n in frame.f_code.co_varnames[:count] if n != "self"]
+        if any(type(value).__module__.startswith("getup_jax.config") for value in given):
+            files.add(path)
+
+    sys.setprofile(watch)
+    try:
+        yield
+    finally:
+        sys.setprofile(None)
+
+
 def test_evaluate_is_what_the_command_says(policy):
-    scores = gj.evaluate(policy, gj.Scenario(episodes=28, seed=3))
+    files: set[str] = set()
+    with settings_are_handed_to(files):
+        scores = gj.evaluate(policy, gj.Scenario(episodes=28, seed=3))
+    assert "envs/getup/build.py" in files
+    assert len(files) <= 12, "docs/design.md says 12: hand over what was built of the settings"
     assert scores.episodes == 28
     assert scores.success > 0.9
     with pytest.raises(ConfigError, match="--push: only for policies of the get-up task"):
