@@ -39,6 +39,9 @@ class CurriculumConfig:
     # for this long a head that is on the floor for too long only costs the reward; limp bodies
     # that came to rest face down must learn to raise it
     head_grace_s: float = number(0.0, least=0, most=3600)
+    # random pushes on the trunk, horizontal, of U(0, this) (Ns); 0: none
+    push_ns: float = number(0.0, least=0, most=1000)
+    push_interval_s: float = number(4.0, above=0, most=3600)  # mean time between two
     # share of the episodes whose curves are drawn: blends of styles that start alike, their control
     # points moved by smooth noise, over other durations; see drawn_curves.py
     drawn_curves: float = number(0.0, least=0, most=1)

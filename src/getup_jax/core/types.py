@@ -5,16 +5,18 @@ One letter an axis, everywhere in the package:
     B simulations    T steps        K objectives    N samples
     J hinge joints (= actuators)    L links, the root first    P pool rows    Q balls
 
-ActionDecoder are SI: m, s, kg, N, Nm, rad. World frame: Z up. Quaternions: w x y z.
+Units are SI: m, s, kg, N, Nm, rad. World frame: Z up. Quaternions: w x y z.
 """
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import Any, Protocol
 
 import chex
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 
 
@@ -83,6 +85,15 @@ def select(mask: jax.Array, a: Any, b: Any) -> Any:
         return jnp.where(mask.reshape(mask.shape + (1,) * (x.ndim - 1)), x, y)
 
     return jax.tree.map(pick, a, b)
+
+
+def array_module(*arrays: object) -> ModuleType:
+    """jax.numpy where one of the arrays is JAX's (traced ones are, too), else NumPy.
+
+    One formula for compiled programs and for the host, where JAX would compile a program for
+    every operation and shape that it meets.
+    """
+    return jnp if any(isinstance(array, jax.Array) for array in arrays) else np
 
 
 def take(rows: Any, index: jax.Array) -> Any:

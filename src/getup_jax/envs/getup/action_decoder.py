@@ -95,16 +95,16 @@ class ActionDecoder:
         return pose_prior.encode_action(self.prior, angles, condition)
 
     def translate(self, action: jax.Array, condition: jax.Array, new: ActionDecoder) -> jax.Array:
-        """The action [..., A'] in other units that has the servo target of this one [..., A]."""
+        """The action [..., A'] in other decoder that has the servo target of this one [..., A]."""
         return new.action(self.pose(action, condition), self.target(action, condition), condition)
 
     def same(self, other: ActionDecoder) -> bool:
         """Whether an action means the same in both."""
         if self.offset_scale != other.offset_scale:
             return False
-        ours, theirs = (jax.tree.leaves(_arrays(units)) for units in (self, other))
+        ours, theirs = (jax.tree.leaves(_arrays(decoder)) for decoder in (self, other))
         return len(ours) == len(theirs) and all(map(np.array_equal, ours, theirs))
 
 
-def _arrays(units: ActionDecoder) -> object:
-    return units.neutral if units.prior is None else pose_prior.to_dict(units.prior)
+def _arrays(decoder: ActionDecoder) -> object:
+    return decoder.neutral if decoder.prior is None else pose_prior.to_dict(decoder.prior)

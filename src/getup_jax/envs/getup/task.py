@@ -230,16 +230,18 @@ class GetUpTask:
         return episode | regions.by_region(episode, state.region)
 
     def _wrench(self, world: World, state: EpisodeState) -> jax.Array | None:
-        """The assistive wrench [B, 6]; None: there is none."""
+        """The assistive wrench and random pushes [B, 6]; None: there are none."""
+        push = self.curriculum.push(state.key, self.observer.links, state.physics.kinematics)
         if state.lift is None:
-            return None
+            return push
         measured = state.observation[:, self.observer.slices()["features"]]
         target = self.targets(state)[:, 0]
         kinematics = state.physics.kinematics
         normal = world.terrain.normal(kinematics.qpos[:, :2])
-        return assistive_wrench.wrench(
+        lift = assistive_wrench.wrench(
             self.observer.links, kinematics, measured, target, normal, state.lift
         )
+        return lift if push is None else lift + push
 
     def servo_target(self, world: World, state: EpisodeState, filtered: jax.Array) -> jax.Array:
         """Hinge targets [B, J]: q = decoder(z, c) + dq [P 3.4], c the curve values now."""

@@ -11,12 +11,13 @@ from __future__ import annotations
 import dataclasses
 from typing import TypeVar
 
+import jax
 import numpy as np
 
-from getup_jax.core.array_module import Array, array_module
+from getup_jax.core.types import array_module
 from getup_jax.physics.character import CharacterSpec
 
-A = TypeVar("A", bound=Array)
+A = TypeVar("A", bound=jax.Array | np.ndarray)
 NUM_POINTS = 9
 NAMES = ("height", "side_angle", "front_angle")
 

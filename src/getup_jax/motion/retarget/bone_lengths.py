@@ -11,7 +11,7 @@ from getup_jax.motion.clips import MotionError
 from getup_jax.motion.io.recording import Recording, rest_positions
 from getup_jax.motion.retarget.joint_names import listed
 
-# ActionDecoder that motion files come in: m, cm, inch, mm, and CMU's (inches times 0.45).
+# Units that motion files come in: m, cm, inch, mm, and CMU's (inches times 0.45).
 _UNITS_M = (1.0, 0.01, 0.0254, 0.001, 0.0254 / 0.45)
 _LEG_M = 0.83  # thigh and shin of an adult
 _NOTHING = 1e-3  # a bone of this share of the skeleton's size has no length

@@ -13,8 +13,9 @@ import jax
 import jax.numpy as jnp
 
 from getup_jax.config import CurriculumConfig, TerrainConfig
+from getup_jax.core import device_axis
 from getup_jax.core.masked_update import running_mean
-from getup_jax.core.types import StepOutput
+from getup_jax.core.types import Kinematics, StepOutput
 from getup_jax.envs.getup.curriculum import (
     assistive_wrench,
     regions,
@@ -32,7 +33,10 @@ from getup_jax.envs.getup.episode import (
     stands,
 )
 from getup_jax.envs.getup.resets.pool import Pool
+from getup_jax.motion.getup.curves import FeatureLinks
 
+_CHEST = 0.7  # of the way from the root to the neck's base
+_PUSHES = 98  # folded into a key, as _CURVES is
 _CURVES = 99  # folded into a key that is also split: none of its parts, which are 0, 1, 2, ...
 
 
@@ -130,6 +134,27 @@ class Curriculum:
             return begun
         most = self.most_lift * state.wrench[self.first_cell(pool, begun)]
         return begun.replace(lift=jnp.where(drawn.assisted, most, 0.0))
+
+    def push(
+        self, key: jax.Array | None, links: FeatureLinks, kinematics: Kinematics
+    ) -> jax.Array | None:
+        """Random pushes for a control step: force (N) and torque (Nm) [B, 6] on the root, world.
+
+        Each simulation is pushed with the chance that makes one every `push_interval_s`, towards
+        any side, by an impulse p; f = p / dt acts at the chest, m = (chest - root) x f. None: there
+        are none.
+        """
+        config = self.config
+        if config.push_ns == 0 or key is None:
+            return None
+        root, neck = (kinematics.link_position[:, i] for i in (links.root, links.neck))
+        key = device_axis.own_key(jax.random.fold_in(key, _PUSHES))
+        chance, size, way = jax.random.uniform(key, (3, len(root)))
+        size = jnp.where(chance < self.control_dt / config.push_interval_s, size, 0.0)
+        way = 2.0 * jnp.pi * way
+        level = jnp.stack([jnp.cos(way), jnp.sin(way), jnp.zeros_like(way)], axis=-1)
+        force = (config.push_ns / self.control_dt * size)[:, None] * level
+        return jnp.concatenate([force, jnp.cross(_CHEST * (neck - root), force)], axis=-1)
 
     def update(
         self, pool: Pool, state: CurriculumState, after: EpisodeState, output: StepOutput

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from getup_jax.core.array_module import array_module
+from getup_jax.core.types import array_module
 from getup_jax.motion.getup import curves
 
 LINKS = curves.FeatureLinks(root=0, neck=1, left_hip=2, right_hip=3)
