@@ -11,7 +11,7 @@ from probes import Probe, make_world
 
 from getup_jax.config import NetworkConfig, PPOConfig
 from getup_jax.rl.actor_critic import normalized
-from getup_jax.rl.advantages import next_values
+from getup_jax.rl.advantages import estimate, next_values
 from getup_jax.rl.learner import Learner, make_learner
 from getup_jax.rl.minibatch import adapt_scale, first_scale
 from getup_jax.rl.policy_update import COSINE_EVERY
@@ -329,3 +329,24 @@ def test_next_values_are_the_critics_on_the_final_observations(run: Run):
     expected = learner.value(state.learner, transition.final_observation)
     assert_allclose(reached, expected, rtol=1e-5, atol=1e-6)
     assert not np.allclose(reached[:-1], value[1:])  # a new episode's value is another one
+
+
+def test_the_critics_targets_may_have_a_lambda_of_their_own():
+    """Advantages follow `gae_lambda`, targets `critic_lambda`; each as if it were the only one."""
+    world = make_world(3, by_sign=1.0, by_action=1.0)
+
+    def samples(gae_lambda: float, critic_lambda: float | None = None):
+        config = dataclasses.replace(CONFIG, gae_lambda=gae_lambda, critic_lambda=critic_lambda)
+        learner = make_learner(Probe(), NETWORK, config, TOTAL_STEPS)
+
+        def rollout(key: jax.Array):
+            state = learner.init(world, key)
+            transition = learner.collect(world, state).transition
+            return estimate(learner.model, state.learner, transition, config)[1]
+
+        return jax.jit(rollout)(jax.random.key(0))
+
+    short, long, both = samples(0.3), samples(0.9), samples(0.3, 0.9)
+    assert_allclose(both.advantage, short.advantage, rtol=1e-5, atol=1e-6)
+    assert_allclose(both.target, long.target, rtol=1e-5, atol=1e-6)
+    assert np.abs(both.target - short.target).max() > 1e-3

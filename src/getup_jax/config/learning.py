@@ -44,7 +44,10 @@ class PPOConfig:
     critic_epochs: int = number(4, least=1, most=1000)  # passes of the critic over a rollout
     minibatch_size: int = number(2048, least=1, most=MOST_SAMPLES)  # samples of an update
     discount: float = number(0.99, least=0, below=1)  # gamma, a control step
-    gae_lambda: float = number(0.95, least=0, most=1)  # of generalised advantage estimation
+    # of generalised advantage estimation: less of it is less noise, and more of the critic's errors
+    gae_lambda: float = number(0.95, least=0, most=1)
+    # of the critic's targets; None: the same
+    critic_lambda: float | None = number(None, least=0, most=1)
     clip: float = number(0.2, above=0, most=10)  # epsilon: how far the probability ratio may move
     # weight of the entropy in the loss
     entropy_coefficient: float = number(0.0, least=0, most=10)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -30,15 +31,12 @@ def estimate(
     """
     observation = normalized(learner.policy, transition.observation)
     value = model.value(learner, observation)
-    advantage, target = gae(
-        transition.reward,
-        value,
-        next_values(model, learner, transition, value),
-        transition.terminated,
-        transition.truncated,
-        config.discount,
-        config.gae_lambda,
-    )
+    following = next_values(model, learner, transition, value)
+    ends = transition.terminated, transition.truncated
+    estimated = functools.partial(gae, transition.reward, value, following, *ends, config.discount)
+    advantage, target = estimated(config.gae_lambda)
+    if config.critic_lambda is not None:
+        _, target = estimated(config.critic_lambda)
     explained = ppo.explained_variance(value, target)
     learner, target = normalize_targets(learner, target)
     samples = Samples(

@@ -95,7 +95,7 @@ class ActionDecoder:
         return pose_prior.encode_action(self.prior, angles, condition)
 
     def translate(self, action: jax.Array, condition: jax.Array, new: ActionDecoder) -> jax.Array:
-        """The action [..., A'] of another decoder that has the servo target of this one [..., A]."""
+        """Another decoder's action [..., A'] that has the servo target of this one [..., A]."""
         return new.action(self.pose(action, condition), self.target(action, condition), condition)
 
     def same(self, other: ActionDecoder) -> bool:
