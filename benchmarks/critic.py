@@ -48,14 +48,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("run", type=Path, help="a run folder of the get-up task")
+    parser.add_argument("run", type=Path, nargs="?", help="a run folder of the get-up task")
     parser.add_argument("--simulations", type=int, default=256)
     parser.add_argument("--seconds", type=float, default=20.0, help="of every simulation")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--quick", action="store_true", help="for `make bench`: two seconds")
     args = parser.parse_args()
+    if args.run is None:
+        print("skipped: needs a run folder")
+        return
     loaded = checkpoint.load_learner(args.run)
     config = load_saved_config(loaded.path.parent / "config.yaml")
-    steps = collect(config, loaded, args.simulations, args.seconds, args.seed)
+    seconds = 2.0 if args.quick else args.seconds
+    steps = collect(config, loaded, args.simulations, seconds, args.seed)
     print(table(config, steps))
 
 
