@@ -81,8 +81,8 @@ def measure(
     learner, world = job.learner, jax.device_put(job.world)
     template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0))
     trained = from_nested(template, loaded.learner, str(loaded.path))
-    iteration = jnp.asarray(loaded.metadata["iteration"], jnp.int32)
-    std = jnp.full(learner.env.action_size, _std(config, int(iteration)))
+    iteration = int(loaded.path.parent.name)  # its checkpoint is called by it
+    std = jnp.full(learner.env.action_size, _std(config, iteration))
     key_init, key_roll = jax.random.split(jax.random.PRNGKey(seed))
     state = jax.jit(lambda w: learner.init_environment(w, key_init, config.ppo.num_envs))(world)
     play = jax.jit(lambda w, s, key: _play(learner, trained, std, w, s, key))
