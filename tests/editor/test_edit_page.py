@@ -9,6 +9,7 @@ import pytest
 from browser import (
     BROWSER,
     HEIGHT,
+    SIDE,
     achieved,
     drag,
     drawn,
@@ -53,9 +54,9 @@ def test_the_keyboard_moves_points_and_shift_mirror_reset_work(page_server):
         for _ in range(6):
             page.keyboard.press("ArrowRight")
         assert value(page, HEIGHT, 4) != middle
-        side = value(page, "Side to up", 2)
+        side = value(page, SIDE, 2)
         page.click("#mirror")
-        assert value(page, "Side to up", 2) == pytest.approx(180 - side, abs=0.11)
+        assert value(page, SIDE, 2) == pytest.approx(180 - side, abs=0.11)
         assert page.input_value("#start").startswith("mirrored ")
         page.click("#reset")
         assert value(page, HEIGHT, 3) == old

@@ -40,6 +40,14 @@ test("a wished pose is there from one time to another, in the curves that it is 
   assert.ok(Math.abs(height(once, 2) - 0.5) < 1e-3);
 });
 
+test("a wish is remembered with what it is about, moves with the time, and gives way to another", () => {
+  const pose = { name: "kneels", contacts: ["left knee"] }, on = edits.wish(content(), 0.5, 0.75, { height: 0.5 }, pose);
+  assert.deepEqual(on.wishes, [{ ...pose, from: 0.5, to: 0.75 }]);
+  assert.deepEqual(edits.hold(on, 0.25, 4).wishes.map((w) => [w.from, w.to]), [[0.75, 0.875]]);
+  assert.deepEqual(edits.wish(on, 0.6, 0.9, { height: 1 }).wishes, []);
+  assert.deepEqual(edits.reset(on).wishes, []);
+});
+
 test("a wish at either end keeps the curve whole", () => {
   for (const [from, to] of [[0, 0], [1, 1], [0, 1], [0, 0.3], [0.7, 1]]) {
     const keys = keysIn(edits.wish(content(), from, to, { height: 0.6 }), "height");

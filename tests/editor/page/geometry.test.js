@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { close } from "./samples.js";
 import { cameraAt } from "../../../src/getup_jax/editor/page/camera.js";
-import { contacts } from "../../../src/getup_jax/editor/page/contacts.js";
+import { contacts, reached } from "../../../src/getup_jax/editor/page/contacts.js";
 import { Scale, snapped, timeTicks, within, zoomed } from "../../../src/getup_jax/editor/page/graph_scale.js";
 import { lostRuns } from "../../../src/getup_jax/editor/page/panel_motion.js";
 
@@ -47,6 +47,16 @@ test("contacts are the links on the ground, turned as they are and on hills", ()
   assert.deepEqual(touching(upright), ["left foot"]);
   assert.deepEqual(touching(lying), []);
   assert.deepEqual(touching(lying, { origin: [-1, -1], step: 1, points: 3, heights: Array(9).fill(0.2) }), ["left foot"]);
+});
+
+test("of a wished pose one sees which contacts were there for half of the time", () => {
+  const shape = (link) => ({ link, kind: "sphere", size: [0.05], position: [0, 0, 0], quaternion: [1, 0, 0, 0] });
+  const scene = { shapes: [shape(0), shape(1)], links: ["hand_l", "hand_r"] };
+  const heights = [[0.05, 0.5], [0.05, 0.5], [0.05, 0.05], [0.5, 0.5]];
+  const motion = { count: 4, ground: null, pose: (i) => Float32Array.from(heights[i].flatMap((z) => [0, 0, z, 1, 0, 0, 0])) };
+  const wish = { name: "", from: 0.25, to: 1, contacts: ["left hand", "right hand"] };
+  assert.deepEqual(reached(scene, motion, wish, { seconds: 4, dt: 1 }), { reached: ["left hand"], missed: ["right hand"], others: [] });
+  assert.deepEqual(reached(scene, motion, { ...wish, contacts: [] }, { seconds: 4, dt: 1 }).others, ["left hand"]);
 });
 
 test("where physics does not follow is said in runs of frames", () => {

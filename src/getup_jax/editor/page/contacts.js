@@ -35,3 +35,14 @@ export function contacts({ shapes, links }, values, ground) {
   }
   return [...found];
 }
+
+/** Of a wish's contacts, those that touched the ground for at least half of its time, and those that did not. @param {any} scene @param {import("./motion.js").Motion} motion @param {import("./types.js").Wish} wish @param {{ seconds: number, dt: number }} of */
+export function reached(scene, motion, wish, { seconds, dt }) {
+  const frame = (/** @type {number} */ share) => Math.min(Math.max(Math.round((share * seconds) / dt) - 1, 0), motion.count - 1);
+  const [first, last] = [frame(wish.from), frame(wish.to)];
+  /** @type {Map<string, number>} */
+  const times = new Map();
+  for (let i = first; i <= last; i++) for (const word of contacts(scene, motion.pose(i), motion.ground)) times.set(word, (times.get(word) ?? 0) + 1);
+  const half = (last - first + 1) / 2, there = (/** @type {string} */ word) => (times.get(word) ?? 0) >= half;
+  return { reached: wish.contacts.filter(there), missed: wish.contacts.filter((word) => !there(word)), others: [...times.keys()].filter((word) => there(word) && !wish.contacts.includes(word)) };
+}

@@ -13,7 +13,7 @@ const MOST_LETTERS = 80;
 /** @param {Curve} curve @returns {Content} */
 export function contentOf(curve) {
   const own = plain(curve);
-  return { curve: own, keys: {}, reference: own, region: 0, place: 0 };
+  return { curve: own, keys: {}, reference: own, region: 0, place: 0, wishes: [] };
 }
 
 /** A curve of its own with one duration, the middle one of a file's. @param {Curve} curve @returns {Curve} */

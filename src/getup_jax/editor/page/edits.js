@@ -13,11 +13,11 @@ import { FEATURES } from "./spline.js";
 /** @param {Content} now @param {Curve} curve @returns {Content} */
 export function choose(now, curve) {
   const own = plain(curve);
-  return { ...now, curve: own, keys: {}, reference: own };
+  return { ...now, curve: own, keys: {}, reference: own, wishes: [] };
 }
 
 /** @param {Content} now @returns {Content} */
-export function reset(now) { return { ...now, curve: now.reference, keys: {} }; }
+export function reset(now) { return { ...now, curve: now.reference, keys: {}, wishes: [] }; }
 
 /** @param {Content} now @param {Partial<Curve>} changed @returns {Content} */
 export function withCurve(now, changed) { return { ...now, curve: { ...now.curve, ...changed } }; }
@@ -30,7 +30,8 @@ function retimed(now, to) {
   /** @type {Partial<Record<Feature, Key[]>>} */
   const changed = {};
   for (const feature of FEATURES) changed[feature] = keysIn(now, feature).map((key) => ({ ...key, time: to(key.time) }));
-  return withKeys(now, changed);
+  const wishes = now.wishes.map((wish) => ({ ...wish, from: to(wish.from), to: to(wish.to) }));
+  return withKeys({ ...now, wishes }, changed);
 }
 
 /** The inner keys of all curves earlier (amount < 0) or later. @param {Content} now @param {number} amount */
@@ -60,18 +61,26 @@ export function hold(now, time, seconds) {
     const moved = keys.map((key) => ({ ...key, time: (key.time * old + (key.time > time ? added : 0)) / whole }));
     changed[feature] = plateau(moved, start, end, value);
   }
-  return last(withKeys(now, changed), whole);
+  const later = (/** @type {number} */ t) => (t * old + (t > time ? added : 0)) / whole;
+  const wishes = now.wishes.map((one) => ({ ...one, from: later(one.from), to: later(one.to) }));
+  return last(withKeys({ ...now, wishes }, changed), whole);
 }
 
-/** Some curves have given values from one time to another: a pose that is wished there. @param {Content} now @param {number} from @param {number} to @param {Values} values */
-export function wish(now, from, to, values) {
+/**
+ * Some curves have given values from one time to another: a pose that is wished there. It takes the place of
+ * wishes at the same time.
+ * @param {Content} now @param {number} from @param {number} to @param {Values} values @param {{ name: string, contacts: string[] }} [pose]
+ */
+export function wish(now, from, to, values, pose) {
   /** @type {Partial<Record<Feature, Key[]>>} */
   const changed = {};
   for (const feature of FEATURES) {
     const value = values[feature];
     if (value !== undefined) changed[feature] = plateau(keysIn(now, feature), from, to, value);
   }
-  return withKeys(now, changed);
+  const others = now.wishes.filter((one) => one.to < from || one.from > to);
+  const wishes = pose ? [...others, { ...pose, from, to }].sort((a, b) => a.from - b.from) : others;
+  return withKeys({ ...now, wishes }, changed);
 }
 
 /** Keys with a flat part; what was there, or too near to it, goes. Both ends stay. @param {Key[]} keys @param {number} from @param {number} to @param {number} value */

@@ -2,6 +2,8 @@
 // and the results alone: an edit makes a request, its answer a result, and both are drawn.
 
 import { Autosave, remember } from "./autosave.js";
+import { reached } from "./contacts.js";
+import { duration } from "./content.js";
 import { Controls } from "./controls.js";
 import { $ } from "./dom.js";
 import { Exports } from "./export.js";
@@ -13,7 +15,7 @@ import { say } from "./notice.js";
 import { Player } from "./player.js";
 import { project } from "./project.js";
 import { Projects } from "./projects.js";
-import { Report } from "./report.js";
+import { Report, wishWords } from "./report.js";
 import { Results } from "./results.js";
 import { help, listen } from "./shortcuts.js";
 import { shortcuts } from "./keyboard.js";
@@ -163,7 +165,13 @@ function show() {
 }
 
 function showReport() {
-  if (scene && store.project) report.show(results.active, results.current(store.active), link.open, scene.match_deg);
+  if (scene && store.project) report.show(results.active, results.current(store.active), link.open, scene.match_deg, wishes);
+}
+
+/** What came of the poses that were wished. */
+function wishes() {
+  const motion = results.active?.motion, of = { seconds: duration(store.now), dt: scene.control_dt };
+  return motion ? store.now.wishes.map((wish) => wishWords(wish.name, reached(scene, motion, wish, of))) : [];
 }
 
 /** @param {import("./types.js").Curve[]} curves @param {string} file */

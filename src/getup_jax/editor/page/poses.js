@@ -3,12 +3,14 @@
 
 /** @import { Feature } from "./types.js" */
 
-/** @type {{ name: string, values: Partial<Record<Feature, number>> }[]} */
+const HANDS = ["left hand", "right hand"], KNEES = ["left knee", "right knee"], FEET = ["left foot", "right foot"];
+
+/** @type {{ name: string, contacts: string[], values: Partial<Record<Feature, number>> }[]} */
 export const POSES = [
-  { name: "hands and knees", values: { height: 0.5, side_angle: 90, front_angle: 165 } },
-  { name: "on the elbows, face down", values: { height: 0.28, side_angle: 90, front_angle: 155 } },
-  { name: "sits, leaning back", values: { height: 0.5, side_angle: 90, front_angle: 60 } },
-  { name: "kneels upright", values: { height: 0.95, side_angle: 90, front_angle: 95 } },
-  { name: "squats", values: { height: 0.8, side_angle: 90, front_angle: 120 } },
-  { name: "bends forward, legs straight", values: { height: 0.95, side_angle: 90, front_angle: 150 } },
+  { name: "hands and knees", contacts: [...HANDS, ...KNEES], values: { height: 0.5, side_angle: 90, front_angle: 165 } },
+  { name: "on the elbows, face down", contacts: ["left forearm", "right forearm"], values: { height: 0.28, side_angle: 90, front_angle: 155 } },
+  { name: "sits, leaning back", contacts: ["pelvis"], values: { height: 0.5, side_angle: 90, front_angle: 60 } },
+  { name: "kneels upright", contacts: KNEES, values: { height: 0.95, side_angle: 90, front_angle: 95 } },
+  { name: "squats", contacts: FEET, values: { height: 0.8, side_angle: 90, front_angle: 120 } },
+  { name: "bends forward, legs straight", contacts: FEET, values: { height: 0.95, side_angle: 90, front_angle: 150 } },
 ];

@@ -72,9 +72,14 @@ function variant(v) {
 /** @param {any} c @returns {Content} */
 function content(c) {
   /** @type {Content} */
-  const found = { curve: curve(c?.curve), keys: {}, reference: curve(c.reference ?? c.curve), region: whole(c.region ?? 0, "region", 100), place: whole(c.place ?? 0, "place", 10_000) };
+  const found = { curve: curve(c?.curve), keys: {}, reference: curve(c.reference ?? c.curve), region: whole(c.region ?? 0, "region", 100), place: whole(c.place ?? 0, "place", 10_000), wishes: list(c.wishes ?? [], "wishes", 0, 50).map(wish) };
   for (const feature of FEATURES) if (c.keys?.[feature]) found.keys[feature] = keys(c.keys[feature], feature);
   return found;
+}
+
+/** @param {any} w @returns {import("./types.js").Wish} */
+function wish(w) {
+  return { name: text(w?.name, "wish"), from: number(w.from, "from"), to: number(w.to, "to"), contacts: list(w.contacts, "contacts", 0, 20).map((x) => text(x, "contact")) };
 }
 
 /** @param {any} c @returns {Curve} */

@@ -32,14 +32,21 @@ export function scoresOf(verdict, matchDeg) {
   return parts;
 }
 
+/** What came of a wish, in a few words. @param {string} name @param {{ reached: string[], missed: string[], others: string[] }} found */
+export function wishWords(name, { reached, missed, others }) {
+  const also = others.length ? `, but on ${others.join(", ")}` : "";
+  if (!missed.length) return `“${name}”: all on the ground (${reached.join(", ")})`;
+  return `⚠ “${name}”: not on the ground: ${missed.join(", ")}${reached.length ? `; there: ${reached.join(", ")}` : ""}${also}`;
+}
+
 export class Report {
   /** @param {Record<"verdict" | "scores" | "latency", HTMLElement>} elements */
   constructor(elements) { this.elements = elements; }
 
-  /** @param {Result | undefined} result @param {boolean} current @param {boolean} connected @param {number} matchDeg */
-  show(result, current, connected, matchDeg) {
+  /** @param {Result | undefined} result @param {boolean} current @param {boolean} connected @param {number} matchDeg @param {() => string[]} wishes what came of them */
+  show(result, current, connected, matchDeg, wishes) {
     const { words, mood } = verdictOf(result, current, connected);
-    const parts = current && result?.verdict ? scoresOf(result.verdict, matchDeg) : [];
+    const parts = current && result?.verdict ? [...wishes(), ...scoresOf(result.verdict, matchDeg)] : [];
     const shown = [words, mood, ...parts].join("\n");
     if (shown === this.shown) return;
     this.shown = shown;

@@ -126,8 +126,9 @@ export class Tools {
     const values = this.valuesOf(value);
     if (!values) return;
     const [from, to] = this.player.range ? this.part : [this.at, this.at];
-    this.store.commit((now) => edits.wish(now, from, to, values));
-    say("Height and angles are wished there. Which hands and feet touch the ground is the policy's choice: contacts are shown under the view.");
+    const pose = value[0] === "p" ? POSES[Number(value.slice(1))] : undefined;
+    this.store.commit((now) => edits.wish(now, from, to, values, pose && { name: pose.name, contacts: pose.contacts }));
+    say("Height and angles are wished there. What touches the ground is the policy's choice: the report says what was reached.");
   }
 
   /** @param {string} value of an option @returns {Partial<Record<Feature, number>> | null} */
@@ -175,7 +176,7 @@ export class Tools {
   put(id, value, count) {
     const input = $(id);
     input.disabled = !count;
-    input.placeholder = count > 1 && value === "" ? "several" : "";
+    input.placeholder = count > 1 && value === "" ? "mixed" : "";
     if (input.value !== String(value)) input.value = value;
   }
 }

@@ -26,7 +26,10 @@
  * @property {Curve} reference what reset goes back to
  * @property {number} region
  * @property {number} place
+ * @property {Wish[]} wishes poses that were wished, so that one sees what came of them
  */
+
+/** @typedef {{ name: string, from: number, to: number, contacts: string[] }} Wish from and to: shares of the duration */
 
 /** @typedef {{ now: Content, past: Content[], future: Content[], tag: string, at: number }} History */
 /** @typedef {{ slot: number, history: History }} Variant slot: 0 to 3, its letter and its colour for life */
