@@ -102,6 +102,21 @@ def wait_for_number(page: Any, before: str) -> None:
     )
 
 
+def says(page: Any, name: str, words: str) -> None:
+    """Until the element with this id says the words."""
+    page.wait_for_function(
+        "([id, words]) => document.getElementById(id).textContent.includes(words)",
+        arg=[name, words],
+        timeout=60_000,
+    )
+
+
+def judged(page: Any) -> str:
+    """The verdict, once there is one."""
+    page.wait_for_function("() => document.getElementById('verdict').className !== ''")
+    return page.inner_text("#verdict")
+
+
 def memory_mib(process: subprocess.Popen[str]) -> float:
     """The most memory that the server has used so far (MiB)."""
     status = Path(f"/proc/{process.pid}/status").read_text()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from browser import BROWSER, FRONT, HEIGHT, drag, drawn, edited, opened, saved, shot, value
+from browser import BROWSER, FRONT, HEIGHT, drag, drawn, edited, judged, opened, saved, shot, value
 
 from getup_jax.motion.io.curve_file import read_curve_file
 
@@ -24,7 +24,7 @@ def count(page, panel: str = HEIGHT) -> int:
 def seek(page, seconds: float) -> None:
     """Click on the axis below the last panel."""
     frame = box(page, FRONT)
-    span = float(page.evaluate("document.getElementById('seconds').value")) + 3
+    span = float(page.input_value("#seconds")) + 3
     across = frame["width"] - 52
     page.mouse.click(frame["x"] + 40 + across * seconds / span, frame["y"] + frame["height"] - 8)
 
@@ -60,7 +60,8 @@ def test_points_are_added_selected_scaled_copied_and_deleted(page_server):
 def test_time_and_value_are_typed_and_read(page_server):
     with opened(page_server[0]) as page:
         page.locator(f'[aria-label="{HEIGHT}"] [data-point="4"]').click()
-        assert float(page.input_value("#key-value")) == value(page, HEIGHT, 4)
+        typed = float(page.input_value("#key-value"))
+        assert typed == pytest.approx(value(page, HEIGHT, 4), abs=1e-3)
         page.fill("#key-value", "0.8")
         edited(page, lambda: page.press("#key-value", "Enter"))
         assert value(page, HEIGHT, 4) == 0.8
@@ -79,7 +80,7 @@ def test_slower_by_mouse_alone(page_server, tmp_path):
         before = float(re.search(r"[\d.]+", page.inner_text("#verdict"))[0])
         page.click("#pass-auto")
         edited(page, lambda: page.click("#stretch"))
-        page.wait_for_function("document.getElementById('verdict').className !== ''")
+        judged(page)
         assert float(page.input_value("#seconds")) == pytest.approx(5.1, abs=0.2)
         after = float(re.search(r"[\d.]+", page.inner_text("#verdict"))[0])
         assert after > before + 0.5
@@ -96,7 +97,7 @@ def test_a_pause_on_hands_and_knees_by_mouse_alone(page_server, tmp_path):
         seek(page, 3.1)
         page.click("#out")
         edited(page, lambda: page.select_option("#pose", label="hands and knees"))
-        page.wait_for_function("document.getElementById('verdict').className !== ''")
+        judged(page)
         seek(page, 2.5)
         drawn(page)
         shot(page, "pause")
@@ -114,7 +115,7 @@ def test_a_pause_on_hands_and_knees_by_mouse_alone(page_server, tmp_path):
 def test_another_style_by_mouse_alone(page_server):
     with opened(page_server[0]) as page:
         edited(page, lambda: page.select_option("#curve", label="supine_situp_squat"))
-        page.wait_for_function("document.getElementById('verdict').className !== ''")
+        judged(page)
         assert page.inner_text("#verdict").startswith("Stands")
         assert page.input_value("#start") == "supine_situp_squat"
 

@@ -5,7 +5,17 @@ from __future__ import annotations
 import re
 
 import pytest
-from browser import BROWSER, HEIGHT, achieved, drag, edited, opened, served, shown, value
+from browser import (
+    BROWSER,
+    HEIGHT,
+    achieved,
+    drag,
+    edited,
+    opened,
+    served,
+    shown,
+    value,
+)
 
 pytestmark = BROWSER
 
@@ -30,10 +40,14 @@ def test_a_project_survives_the_browser_and_the_server(tmp_path):
         kept(page)
     port = re.search(r":(\d+)", address)[1]
     with served("--port", port) as (address, _), opened(address, profile) as page:
-        page.wait_for_function("document.getElementById('project').textContent.includes('Tom')")
+        page.wait_for_function(
+            "() => document.getElementById('project').textContent.includes('Tom')"
+        )
         assert page.locator("[role=tab]").count() == 2
         assert (value(page, HEIGHT, 4), value(page, HEIGHT, 6)) == found
-        page.wait_for_function("!document.getElementById('verdict').textContent.includes('…')")
+        page.wait_for_function(
+            "() => !document.getElementById('verdict').textContent.includes('…')"
+        )
         assert achieved(page) == line
         edited(page, lambda: page.keyboard.press("Control+z"))
         assert value(page, HEIGHT, 6) != found[1]
@@ -58,7 +72,7 @@ def test_projects_are_made_exported_imported_and_removed(page_server, tmp_path):
         page.click("#project")
         assert page.locator("#project-list li").count() == 3
         page.locator('#project-list button[title="Remove"]:not([disabled])').first.click()
-        page.wait_for_function("document.querySelectorAll('#project-list li').length === 2")
+        page.wait_for_function("() => document.querySelectorAll('#project-list li').length === 2")
         page.click("#toast button")
         bad = tmp_path / "bad.getup.json"
         bad.write_text('{"format": 1}')
@@ -76,7 +90,9 @@ def test_two_tabs_of_one_project_lose_nothing(page_server):
         edited(page, lambda: drag(page, HEIGHT, 4, 40))
         kept(page)
         edited(other, lambda: drag(other, HEIGHT, 4, -40))
-        other.wait_for_function("document.getElementById('project').textContent.includes('copy')")
+        other.wait_for_function(
+            "() => document.getElementById('project').textContent.includes('copy')"
+        )
         here, there = value(page, HEIGHT, 4), value(other, HEIGHT, 4)
         kept(other)
         for tab, found in ((page, here), (other, there)):

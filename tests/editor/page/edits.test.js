@@ -1,7 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { close, content } from "./samples.js";
+import { close, content, curve } from "./samples.js";
+import { alike, distance } from "../../../src/getup_jax/editor/page/alike.js";
 import { asked, duration, keptDuration, keptName, keysIn } from "../../../src/getup_jax/editor/page/content.js";
 import * as edits from "../../../src/getup_jax/editor/page/edits.js";
 import { drawn, valueAt } from "../../../src/getup_jax/editor/page/keys.js";
@@ -105,6 +106,15 @@ test("no edit changes what it was given", () => {
   edits.startFrom(now, "x", [0, 90, 90]);
   edits.reset(now);
   assert.equal(JSON.stringify(now), before);
+});
+
+test("an imported curve is compared with the styles that the policy knows, on either side", () => {
+  const known = [curve({ name: "flat", height: Array(9).fill(0.1) }), curve({ name: "rise" })];
+  const other = curve({ side_angle: curve().side_angle.map((v) => 180 - v) });
+  assert.equal(alike(curve(), known), "like rise");
+  assert.equal(alike(other, known), "like rise");
+  assert.equal(alike(curve({ front_angle: Array(9).fill(0) }), known), "unlike any style that the policy knows");
+  assert.equal(distance(curve(), curve()), 0);
 });
 
 test("fields keep what can be kept", () => {

@@ -7,7 +7,6 @@ const TAB = "getup-edit-project"; // the one that this tab, and the next new one
 export class Autosave {
   /** @param {import("./storage.js").Storage} storage @param {import("./store.js").Store} store @param {(text: string, bad?: boolean) => void} say */
   constructor(storage, store, say) {
-    Object.assign(this, { storage, store, say });
     this.storage = storage;
     this.store = store;
     this.say = say;
@@ -15,6 +14,8 @@ export class Autosave {
     this.writing = null;
     this.due = false;
     this.failed = false;
+    /** @type {Project | null} as it was stored or read last */
+    this.known = null;
     addEventListener("beforeunload", (event) => {
       if ((this.due || this.failed || !storage.lasting) && store.project) event.preventDefault();
     });
@@ -30,8 +31,17 @@ export class Autosave {
     return newest ? this.storage.read(newest.id) : null;
   }
 
+  /** Opens a project; one that is stored already is not stored anew, since another tab may have it too. @param {Project} project @param {boolean} fresh */
+  open(project, fresh) {
+    this.known = fresh ? null : project;
+    this.store.open(project);
+    remember(project.id);
+    return fresh ? this.save() : Promise.resolve();
+  }
+
   /** Soon stored; what is edited meanwhile is stored after it. */
   save() {
+    if (this.store.project === this.known) return this.writing ?? Promise.resolve();
     this.due = true;
     this.writing ??= this.work().finally(() => { this.writing = null; });
     return this.writing;
@@ -55,8 +65,9 @@ export class Autosave {
   /** @param {Project} project @param {Project} written */
   stored(project, written) {
     if (this.store.project?.id !== project.id) return; // another one was opened meanwhile
-    const { id, name, revision, saved } = written;
+    const { id, name, revision, saved } = written, newest = this.store.project === project;
     this.store.change({ id, revision, saved, name: id === project.id ? this.store.project.name : name });
+    if (newest) this.known = this.store.project;
     remember(id);
     document.body.dataset.saved = String(revision);
     if (id !== project.id) {

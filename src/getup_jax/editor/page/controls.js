@@ -1,5 +1,6 @@
 // The controls below the curves and in the header; they change the store and follow it.
 
+import { alike } from "./alike.js";
 import { duration, DURATION_S, keptDuration, keptName } from "./content.js";
 import { group, option } from "./dom.js";
 import * as edits from "./edits.js";
@@ -81,7 +82,7 @@ export class Controls {
     this.listed = listed;
     const references = new Map(starts.map((/** @type {any} */ s) => [s.name, s.lies]));
     const of = (/** @type {string | undefined} */ lies) => curves.flatMap((/** @type {Curve} */ c, /** @type {number} */ i) => (references.get(c.name) === lies ? [option(`c${i}`, c.name)] : []));
-    const own = imported.map(({ curve, file }, i) => option(`i${i}`, `${curve.name} (${file}, ${curve.durations[0].toFixed(1)} s)`));
+    const own = imported.map(({ curve, file }, i) => option(`i${i}`, `${curve.name} (${file}, ${curve.durations[0].toFixed(1)} s, ${alike(curve, curves)})`));
     const groups = [...LIES.map((lies) => group(lies, of(lies))), group("drawn", of(undefined)), group("imported", own)];
     this.elements.curve.replaceChildren(option("", "choose …"), ...groups.filter((g) => g.children.length));
   }

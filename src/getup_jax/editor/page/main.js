@@ -1,7 +1,8 @@
 // The page: connects the store, the server, the curves and the views. What is shown follows from the store
 // and the results alone: an edit makes a request, its answer a result, and both are drawn.
 
-import { Autosave, remember } from "./autosave.js";
+import { alike } from "./alike.js";
+import { Autosave } from "./autosave.js";
 import { reached } from "./contacts.js";
 import { duration } from "./content.js";
 import { Controls } from "./controls.js";
@@ -101,9 +102,7 @@ async function ready(description) {
   tools.fillPoses(scene);
   results.begin(scene);
   if (store.project) return store.tell("show");
-  store.open(last ?? project(scene.curves[0], "My get-up"));
-  remember(/** @type {any} */ (store.project).id);
-  if (!last) autosave.save();
+  autosave.open(last ?? project(scene.curves[0], "My get-up"), !last);
   if (!storage.lasting) say("This browser keeps nothing: export the project before you close the page.", true);
 }
 
@@ -180,7 +179,7 @@ function taken(curves, file) {
   store.commit((now) => choose(now, curve));
   const more = curves.length > 1 ? `; ${curves.length - 1} more under Curve` : "";
   const lengths = curve.durations.length > 1 ? ` (of its durations ${curve.durations.join(", ")} s the middle one)` : "";
-  say(`${file}: ${curve.name}${lengths}${more}`);
+  say(`${file}: ${curve.name}${lengths}, ${alike(curve, scene.curves)}${more}`);
 }
 
 for (const id of ["source", "follow", "apart", "standard"]) $(id).addEventListener("change", () => {

@@ -1,7 +1,6 @@
 // The dialog of projects: open, name, copy, remove, export to a file and import.
 
 import { $, download, el } from "./dom.js";
-import { remember } from "./autosave.js";
 import { say } from "./notice.js";
 import { copyOf, fromText, project, SUFFIX, toText } from "./project.js";
 
@@ -68,9 +67,7 @@ export class Projects {
   /** @param {Project} opened @param {boolean} fresh not stored yet */
   async open(opened, fresh = true) {
     await this.autosave.save(); // the last edit of the one that is left
-    this.store.open(opened);
-    remember(opened.id);
-    if (fresh) await this.autosave.save();
+    await this.autosave.open(opened, fresh);
     $("dialog").close();
     say(`Project “${this.own.name}”`);
   }

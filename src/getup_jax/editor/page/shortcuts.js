@@ -23,6 +23,10 @@ export function listen(shortcuts) {
     event.preventDefault();
     act();
   });
+  // a field that is done with gives the keys back
+  addEventListener("keydown", (event) => {
+    if (event.key === "Enter" && types(event.target) && !$("dialog").open) /** @type {HTMLElement} */ (event.target).blur();
+  });
   // what was clicked does not keep the keys that follow
   addEventListener("pointerup", (event) => {
     const target = /** @type {Element} */ (event.target).closest?.("button, input[type=range], input[type=checkbox]");

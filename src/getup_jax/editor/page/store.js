@@ -86,7 +86,7 @@ export class Store extends EventTarget {
     this.commit();
     const copy = { slot, history: history.begin(this.now) };
     this.change({ variants: [...this.variants, copy].sort((a, b) => a.slot - b.slot), active: slot });
-    this.tell("show");
+    this.tell("commit", performance.now());
   }
 
   /** Gives the variant that was removed, for those who want it back. */

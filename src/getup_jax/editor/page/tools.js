@@ -164,7 +164,7 @@ export class Tools {
     const unit = keys.length && keys.every((k) => k.feature === "height") ? "m" : keys.length ? "°" : "";
     const time = one(({ time: t }) => (graph.frames ? Math.round((t * seconds) / graph.model.controlDt) : Number((t * seconds).toFixed(3))));
     this.put("key-time", time, keys.length);
-    this.put("key-value", one((key) => key.value), keys.length);
+    this.put("key-value", one((key) => Number(key.value.toFixed(3))), keys.length);
     $("time-unit").textContent = graph.frames ? "frame" : "s";
     $("value-unit").textContent = unit;
     const kind = one((key) => key.kind);
