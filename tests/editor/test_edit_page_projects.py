@@ -70,6 +70,7 @@ def test_projects_are_made_exported_imported_and_removed(page_server, tmp_path):
         page.keyboard.press("Control+z")
         assert value(page, HEIGHT, 4) != found
         page.click("#project")
+        page.wait_for_selector("#project-list li >> nth=2")
         assert page.locator("#project-list li").count() == 3
         page.locator('#project-list button[title="Remove"]:not([disabled])').first.click()
         page.wait_for_function("() => document.querySelectorAll('#project-list li').length === 2")
