@@ -85,7 +85,8 @@ def test_what_goes_wrong_at_the_start_ends_the_server_with_its_reason():
 
 
 def test_a_port_in_use_is_said(site, capsys, monkeypatch):
-    monkeypatch.setattr(server.checkpoint, "load_policy", lambda path: None)
+    loaded = types.SimpleNamespace(config=types.SimpleNamespace(composite_motion=False))
+    monkeypatch.setattr(server.checkpoint, "load_policy", lambda path: loaded)
     assert main.edit_main(["--port", str(site.port)]) == 2
     error = capsys.readouterr().err
     assert error.startswith(f"EditorError: port {site.port}: in use on 127.0.0.1; give another")
