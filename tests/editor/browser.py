@@ -28,7 +28,7 @@ BROWSER = [
     pytest.mark.slow,
     pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt install chromium)"),
 ]
-HEIGHT = "Neck height"
+HEIGHT, SIDE, FRONT = "Neck height", "Lean to the side", "Lean forward"
 _EDIT = "import sys; from getup_jax.cli.main import edit_main; sys.exit(edit_main(sys.argv[1:]))"
 
 
@@ -51,20 +51,28 @@ def served(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
 
 
 @contextlib.contextmanager
-def opened(address: str, **context: Any) -> Iterator[Any]:
-    """The page at the address, with its first motion; what goes wrong in it fails the test."""
+def opened(address: str, profile: Path | None = None, **context: Any) -> Iterator[Any]:
+    """The page at the address, with its first motion; what goes wrong in it fails the test.
+
+    A profile keeps what a browser keeps when it is closed.
+    """
     from playwright.sync_api import sync_playwright
 
     problems: list[str] = []
+    options = {"viewport": {"width": 1280, "height": 800}, **context}
     with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=CHROMIUM, args=list(_FLAGS))
-        size = {"width": 1280, "height": 800}
-        page = browser.new_context(**{"viewport": size, **context}).new_page()
+        kind, started = play.chromium, {"executable_path": CHROMIUM, "args": list(_FLAGS)}
+        if profile is None:
+            holder = kind.launch(**started)
+            page = holder.new_context(**options).new_page()
+        else:
+            holder = kind.launch_persistent_context(profile, **started, **options)
+            page = holder.pages[0]
         page.on("pageerror", lambda error: problems.append(str(error)))
         page.goto(address)
         page.wait_for_selector("body[data-shown]", timeout=120_000)
         yield page
-        browser.close()
+        holder.close()
     assert not problems, problems
 
 
@@ -92,6 +100,21 @@ def wait_for_number(page: Any, before: str) -> None:
     page.wait_for_function(
         "before => Number(document.body.dataset.shown) > before", arg=int(before), timeout=60_000
     )
+
+
+def says(page: Any, name: str, words: str) -> None:
+    """Until the element with this id says the words."""
+    page.wait_for_function(
+        "([id, words]) => document.getElementById(id).textContent.includes(words)",
+        arg=[name, words],
+        timeout=60_000,
+    )
+
+
+def judged(page: Any) -> str:
+    """The verdict, once there is one."""
+    page.wait_for_function("() => document.getElementById('verdict').className !== ''")
+    return page.inner_text("#verdict")
 
 
 def memory_mib(process: subprocess.Popen[str]) -> float:
@@ -131,9 +154,14 @@ def achieved(page: Any) -> str:
 
 
 def saved(page: Any, click: str, folder: Path) -> Path:
-    """The file that #save or a kind of export gives."""
+    """The file that #save, or the dialog of exports with a format, gives."""
     with page.expect_download(timeout=60_000) as download:
-        page.click(click) if click.startswith("#save") else page.select_option("#export", click)
+        if click.startswith("#"):
+            page.click(click)
+        else:
+            page.click("#export")
+            page.select_option("#format", click)
+            page.click("#export-go")
     path = folder / download.value.suggested_filename
     download.value.save_as(path)
     return path

@@ -1,16 +1,20 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from getup_jax.config import ConfigError
 from getup_jax.editor import export as exports
 from getup_jax.editor.export import export
 from getup_jax.editor.simulate import link_poses
+from getup_jax.editor.takes import RATES, WHOLE, Cut
+from getup_jax.motion.clips import MotionError
 from getup_jax.motion.io.bvh import read_bvh
 from getup_jax.motion.io.curve_file import parse_text
 from getup_jax.motion.io.recording import forward, scaled
@@ -19,32 +23,80 @@ from getup_jax.motion.retarget.cache import read_npz
 MILLIMETRE = 0.001
 
 
-def test_a_bvh_file_has_every_link_where_it_was(motion, simulator, tmp_path):
-    path = tmp_path / "motion.bvh"
-    path.write_bytes(export(motion, simulator.character, "bvh"))
-    recording = scaled(read_bvh(path), 0.01)  # BVH files are in centimetres
-    position, rotation = forward(recording)
+def with_start(motion) -> np.ndarray:
+    """All poses of a motion, from 0 s on."""
+    return np.concatenate([motion.start_pose[None], motion.frames.qpos])
+
+
+def front(position: np.ndarray) -> np.ndarray:
+    """Positions [..., 3] with the quarter turn that makes the rest pose face +Z in the file."""
+    return position[..., [1, 0, 2]] * [1.0, -1.0, 1.0]
+
+
+def bvh(motion, simulator, folder, cut=WHOLE):
+    path = folder / "motion.bvh"
+    path.write_bytes(export(motion, simulator.character, "bvh", cut))
+    return scaled(read_bvh(path), 0.01)  # BVH files are in centimetres
+
+
+def test_a_bvh_file_has_every_link_where_it_was_from_0_s_on(motion, simulator, tmp_path):
+    recording = bvh(motion, simulator, tmp_path)
+    position, _ = forward(recording)
     order = [recording.joint(name) for name in simulator.character.link_names]
-    links = motion.frames.links
-    assert np.abs(position[:, order] - links[..., :3]).max() < MILLIMETRE
-    matrix = np.zeros(9)
-    mujoco.mju_quat2Mat(matrix, links[-1, 0, 3:].astype(np.float64))
-    np.testing.assert_allclose(rotation[-1, order[0]], matrix.reshape(3, 3), atol=1e-4)
+    links = link_poses(simulator.character, with_start(motion))
+    assert len(position) == len(motion.frames.qpos) + 1
+    assert np.abs(position[:, order] - front(links[..., :3])).max() < MILLIMETRE
     assert recording.fps == pytest.approx(30.0, rel=1e-6)
 
 
-def test_a_bvh_file_stands_along_y_in_centimetres(motion, simulator):
-    text = export(motion, simulator.character, "bvh").decode()
-    name, offset = "shin_l", None
-    lines = iter(text.splitlines())
-    for line in lines:
-        if line.strip() == f"JOINT {name}":
-            next(lines)
-            offset = [float(x) for x in next(lines).split()[1:]]
-    body = simulator.character.model.body(name)
+def test_a_bvh_file_rests_as_a_t_that_faces_z_and_stands_along_y(motion, simulator):
+    offsets = {}
+    for line in export(motion, simulator.character, "bvh").decode().splitlines():
+        words = line.split()
+        if words and words[0] in ("ROOT", "JOINT"):
+            name = words[1]
+        elif words and words[0] == "OFFSET" and name not in offsets:
+            offsets[name] = np.array([float(x) for x in words[1:]])
+    model = simulator.character.model
     # down the thigh is -z here, and -y in the file
-    np.testing.assert_allclose(offset, 100 * body.pos[[1, 2, 0]], atol=1e-4)
-    assert offset[1] < -30
+    shin = 100 * model.body("shin_l").pos[[1, 2, 0]]
+    np.testing.assert_allclose(offsets["shin_l"], shin, atol=1e-3)
+    assert offsets["shin_l"][1] < -30
+    for side, sign in (("l", 1), ("r", -1)):  # seen from +Z, its left is +X
+        for name in (f"forearm_{side}", f"hand_{side}"):
+            along = sign * offsets[name] / np.linalg.norm(offsets[name])
+            np.testing.assert_allclose(along, [1.0, 0.0, 0.0], atol=1e-4)
+
+
+def test_a_bvh_file_has_no_jumps_of_angles(motion, simulator):
+    """Half turns about the vertical, past every seam of the angles."""
+    turning = np.tile(simulator.character.neutral_qpos, (90, 1))
+    half = np.linspace(0.0, 3.0 * np.pi, 90) / 2
+    turning[:, 3], turning[:, 6] = np.cos(half), np.sin(half)
+    frames = dataclasses.replace(motion.frames, qpos=turning[1:])
+    whole = dataclasses.replace(motion, frames=frames, start_pose=turning[0])
+    text = export(whole, simulator.character, "bvh").decode()
+    rows = [line.split() for line in text[text.index("Frame Time") :].splitlines()[1:]]
+    assert np.abs(np.diff(np.array(rows, float)[:, 3:], axis=0)).max() < 10.0
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_a_part_at_another_rate_is_the_same_motion(motion, simulator, tmp_path, rate):
+    recording = bvh(motion, simulator, tmp_path, Cut(rate, 0.2, 0.8))
+    assert recording.fps == pytest.approx(rate, rel=1e-5)
+    assert recording.num_frames == int(0.6 * rate + 1e-6) + 1
+    position, _ = forward(recording)
+    root = recording.joint(simulator.character.link_names[0])
+    known = np.arange(len(with_start(motion))) / 30.0
+    times = 0.2 + np.arange(recording.num_frames) / rate
+    places = with_start(motion)[:, :3]
+    wanted = np.stack([np.interp(times, known, column) for column in places.T], axis=1)
+    assert np.abs(position[:, root] - front(wanted)).max() < MILLIMETRE
+
+
+def test_a_part_without_frames_is_refused(motion, simulator):
+    with pytest.raises(MotionError, match=r"at least two frames, got 0\.5 s to 0\.5 s; move in or"):
+        export(motion, simulator.character, "bvh", Cut(None, 0.5, 0.5))
 
 
 def test_an_npz_file_is_a_clip_and_more(motion, simulator, tmp_path):
@@ -93,10 +145,37 @@ def test_link_poses_are_those_of_mujoco(simulator):
     )
 
 
-def test_a_glb_file_has_the_motion_as_an_animation(motion, simulator):
+def test_a_glb_file_has_the_motion_to_a_millimetre(motion, simulator):
     gltf = pytest.importorskip("pygltflib")
-    document = gltf.GLTF2.load_from_bytes(export(motion, simulator.character, "glb"))
+    content = export(motion, simulator.character, "glb", Cut(60))
+    document = gltf.GLTF2.load_from_bytes(content)
     (animation,) = document.animations
     assert animation.name == motion.curve.name
-    clock = document.accessors[animation.samplers[0].input]
-    assert clock.count == len(motion.frames.qpos)
+    frames = 2 * len(motion.frames.qpos) + 1
+    assert document.accessors[animation.samplers[0].input].count == frames
+    blob = document.binary_blob()
+    position = np.zeros((frames, len(document.nodes), 3))
+    world = [Rotation.identity(frames)] * len(document.nodes)
+    moved = {
+        (channel.target.node, channel.target.path): animation.samplers[channel.sampler].output
+        for channel in animation.channels
+    }
+
+    def values(accessor: int, width: int) -> np.ndarray:
+        view = document.bufferViews[document.accessors[accessor].bufferView]
+        rows = blob[view.byteOffset : view.byteOffset + view.byteLength]
+        return np.frombuffer(rows, "<f4").reshape(-1, width)
+
+    links = simulator.character.link_names
+    for node, name in enumerate(links):  # parents come first
+        parent = simulator.character.model.body_parentid[1 + node] - 1
+        place = np.tile(document.nodes[node].translation, (frames, 1))
+        if (node, "translation") in moved:
+            place = values(moved[node, "translation"], 3)
+        turn = Rotation.from_quat(values(moved[node, "rotation"], 4))
+        assert document.nodes[node].name == name
+        above = world[parent] if parent >= 0 else Rotation.identity(frames)
+        base = position[:, parent] if parent >= 0 else 0.0
+        position[:, node], world[node] = base + above.apply(place), above * turn
+    wanted = link_poses(simulator.character, with_start(motion))
+    assert np.abs(position[::2, : len(links)] - wanted[..., :3]).max() < MILLIMETRE

@@ -17,6 +17,7 @@ from getup_jax.editor import messages
 from getup_jax.editor.answers import answer
 from getup_jax.editor.messages import pack, read
 from getup_jax.editor.session import error_message
+from getup_jax.editor.takes import Cut
 from getup_jax.motion.clips import Clip
 from getup_jax.motion.retarget.cache import write_npz
 from getup_jax.motion.retarget.retarget import RetargetReport
@@ -29,6 +30,8 @@ TEXTS = {
     "save": PLAIN,
     "export": {**PLAIN, "format": "csv"},
     "load": {"number": 1, "name": "a.yaml", "text": "name: x"},
+    "recording": {"number": 1, "name": "prone"},
+    "cancel": {"number": 2, "of": 1},
 }
 NUMBERS = [True, -1, 0.5, 2**31, 2**63, 10**400, -(10**400), 1e308, float("nan"), float("inf")]
 WORDS = [
@@ -75,7 +78,7 @@ def said_of(session, message: str | bytes) -> str | None:
     request, refused = None, None
     try:
         request = read(message)
-        if request.type not in ("simulate", "export"):
+        if request.type not in ("simulate", "export", "cancel"):
             answer(request, session, Stop())
     except Exception as error:
         refused = error
@@ -100,7 +103,7 @@ def test_the_messages_themselves_are_read(session):
 @pytest.mark.parametrize("kind", TEXTS)
 def test_a_wrong_value_in_any_field_is_refused(session, kind):
     for key in ("type", *TEXTS[kind]):
-        if (kind, key) in (("simulate", "type"), ("save", "type"), ("export", "type")):
+        if key == "type":
             continue  # below
         for value in WRONG:
             text = said_of(session, json.dumps({"type": kind, **TEXTS[kind], key: value}))
@@ -224,3 +227,32 @@ def test_a_file_of_32_mb_is_the_largest():
     assert len(read(pack(head, bytes(messages.MAX_FILE_BYTES))).content) == 32_000_000
     with pytest.raises(messages.MessageError, match="expected at most 32 MB"):
         read(pack(head, bytes(messages.MAX_FILE_BYTES + 1)))
+
+
+@pytest.mark.parametrize("kind", ["simulate", "export"])
+def test_a_motion_needs_no_name_and_a_file_gets_the_one_that_is_given(kind):
+    curve = {key: value for key, value in CURVE.items() if key not in ("name", "strategy")}
+    said = {"type": kind, "number": 1, "format": "bvh", "name": "late rise", "curve": curve}
+    found = read(json.dumps(said)).curve
+    assert found is not None
+    assert found.name == ("late rise" if kind == "export" else "curve")
+
+
+@pytest.mark.parametrize("key", ["rate", "from", "to", "turn"])
+def test_a_wrong_part_of_a_motion_is_refused(session, key):
+    good = {
+        "type": "export",
+        **PLAIN,
+        "format": "bvh",
+        "rate": 24,
+        "from": 0.5,
+        "to": 2,
+        "turn": True,
+    }
+    assert read(json.dumps(good)).cut == Cut(24, 0.5, 2.0, True)
+    for value in WRONG:
+        if value is None or (key == "turn" and value is True):
+            continue  # the default, and what turns
+        if key in ("from", "to") and value == 0.5:
+            continue
+        assert said_of(session, json.dumps({**good, key: value})) is not None, f"{value!r:.60}"

@@ -7,6 +7,7 @@ import re
 import struct
 import threading
 import time
+import types
 
 import pytest
 from edit_running import CURVE, Quick, Running, ask, get, request, running, socket
@@ -84,7 +85,8 @@ def test_what_goes_wrong_at_the_start_ends_the_server_with_its_reason():
 
 
 def test_a_port_in_use_is_said(site, capsys, monkeypatch):
-    monkeypatch.setattr(server.checkpoint, "load_policy", lambda path: None)
+    loaded = types.SimpleNamespace(config=types.SimpleNamespace(composite_motion=False))
+    monkeypatch.setattr(server.checkpoint, "load_policy", lambda path: loaded)
     assert main.edit_main(["--port", str(site.port)]) == 2
     error = capsys.readouterr().err
     assert error.startswith(f"EditorError: port {site.port}: in use on 127.0.0.1; give another")
@@ -105,3 +107,14 @@ def test_bad_arguments_are_refused(arguments, text, capsys):
         main.edit_main(arguments)
     assert caught.value.code == 2
     assert text in capsys.readouterr().err
+
+
+def test_a_policy_that_follows_no_curves_is_refused_with_what_opens_it(monkeypatch, capsys):
+    config = types.SimpleNamespace(composite_motion=True)
+    loaded = types.SimpleNamespace(config=config, path="runs/walk")
+    monkeypatch.setattr(server.checkpoint, "load_policy", lambda path: loaded)
+    assert main.edit_main(["--ckpt", "runs/walk", "--port", "0"]) != 0
+    said = capsys.readouterr().err
+    assert "runs/walk: a policy of composite motion" in said
+    assert "getup-eval --ckpt" in said
+    assert "Traceback" not in said

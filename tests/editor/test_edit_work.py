@@ -9,12 +9,14 @@ import sys
 import time
 import types
 
+import numpy as np
 import pytest
-from edit_running import CURVE, Quick, request, running, socket
+from edit_running import Quick, request, running, socket
 
 from getup_jax.config import PhysicsConfig
 from getup_jax.editor import export
 from getup_jax.editor.messages import pack
+from getup_jax.editor.takes import Cut
 from getup_jax.editor.work import SLOW
 from getup_jax.evaluation import film
 from getup_jax.motion.retarget.subprocess_job import AbandonedError, Stop
@@ -129,23 +131,67 @@ def test_a_server_that_ends_leaves_no_worker_behind(pids):
         assert until(lambda: not alive(pids))
 
 
-def test_a_film_that_nobody_waits_for_ends_between_two_pictures(monkeypatch, tmp_path):
-    shown, stop = [], Stop()
+def test_a_page_cancels_what_it_asked_for_and_no_other_page_does(site, pids):
+    with contextlib.ExitStack() as stack:
+        page, other = opened(stack, site), opened(stack, site)
+        importing(page, 7)
+        assert until(lambda: len(alive(pids)) == 1)
+        other.send(json.dumps({"type": "cancel", "number": 8, "of": 7}))
+        other.send(request(type="save"))
+        other.recv(timeout=30)
+        assert len(alive(pids)) == 1
+        page.send(json.dumps({"type": "cancel", "number": 8, "of": 7}))
+        answer = json.loads(page.recv(timeout=30))
+        assert (answer["type"], answer["number"], answer["text"]) == ("error", 7, "cancelled")
+        assert until(lambda: not alive(pids))
 
-    class Writer:
-        def append_data(self, image):
-            shown.append(image)
-            stop.set()
 
-    writer = contextlib.nullcontext(Writer())
-    imageio = types.SimpleNamespace(get_writer=lambda *_, **__: writer)
-    monkeypatch.setattr(film, "require", lambda: imageio)
-    monkeypatch.setattr(film, "pictures", lambda *_: iter(range(1000)))
-    monkeypatch.setattr(film, "caption", lambda image, text: image)
-    frames = types.SimpleNamespace(qpos=None)
-    motion = types.SimpleNamespace(
-        frames=frames, control_dt=0.1, curve=types.SimpleNamespace(name=CURVE["name"])
-    )
+class Writer:
+    """Takes pictures as a film would, and calls for each of them."""
+
+    def __init__(self, call) -> None:
+        self.shown, self._call = [], call
+
+    def append_data(self, image):
+        self.shown.append(image)
+        self._call()
+
+
+@pytest.fixture
+def filmed(monkeypatch):
+    """Films the standing character for a second, without a renderer."""
+
+    def run(writer: Writer, stop: Stop, cut: Cut, progress=lambda share: None):
+        imageio = types.SimpleNamespace(get_writer=lambda *_, **__: contextlib.nullcontext(writer))
+        camera = types.SimpleNamespace(picture=lambda row, seen: seen.azimuth, close=lambda: None)
+        monkeypatch.setattr(film, "require", lambda: imageio)
+        monkeypatch.setattr(film, "Camera", lambda model, size: camera)
+        qpos = np.tile(CHARACTER.neutral_qpos, (30, 1))
+        motion = types.SimpleNamespace(
+            frames=types.SimpleNamespace(qpos=qpos),
+            start_pose=qpos[0],
+            control_dt=1 / 30,
+            curve=types.SimpleNamespace(name="line"),
+        )
+        export.export(motion, CHARACTER, "mp4", cut, stop, progress)
+
+    return run
+
+
+def test_a_film_that_nobody_waits_for_ends_between_two_pictures(filmed):
+    stop = Stop()
+    writer = Writer(stop.set)
     with pytest.raises(AbandonedError):
-        export.export(motion, CHARACTER, "mp4", stop)
-    assert shown == [0]
+        filmed(writer, stop, Cut())
+    assert len(writer.shown) == 1
+
+
+def test_a_film_says_how_much_is_done_and_turns_once(filmed, tmp_path, monkeypatch):
+    shares: list[float] = []
+    writer = Writer(lambda: None)
+    monkeypatch.setattr(export.Path, "read_bytes", lambda path: b"film")
+    filmed(writer, Stop(), Cut(24, 0.0, 0.5, turn=True), shares.append)
+    assert shares == pytest.approx(np.arange(1, 14) / 13)
+    turned = np.diff(writer.shown)
+    assert len(writer.shown) == 13
+    np.testing.assert_allclose(turned, 360 / 13)

@@ -1,4 +1,4 @@
-"""A simulated motion as a file: BVH, NumPy's npz, CSV or a film."""
+"""A simulated motion as a file: GLB, BVH, NumPy's npz, CSV or a film."""
 
 from __future__ import annotations
 
@@ -7,73 +7,66 @@ import dataclasses
 import io
 import json
 import tempfile
-import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from getup_jax.config import ConfigError
+from getup_jax.editor.films import Progress, write_film
 from getup_jax.editor.simulate import Motion
+from getup_jax.editor.skeleton import recording
+from getup_jax.editor.takes import WHOLE, Cut, take
 from getup_jax.evaluation import film
 from getup_jax.motion.getup.curves import NAMES
 from getup_jax.motion.io.bvh_writer import write_bvh
 from getup_jax.motion.io.curve_file import dump
-from getup_jax.motion.io.glb_writer import Take, glb_bytes
-from getup_jax.motion.io.recording import Recording
+from getup_jax.motion.io.glb_writer import Take, glb_bytes, require_glb
 from getup_jax.motion.retarget.retarget import RetargetReport
 from getup_jax.motion.retarget.subprocess_job import Stop
 from getup_jax.physics.character import CharacterSpec
 
-FORMATS = ("bvh", "npz", "csv", "mp4")
+FORMATS = ("glb", "bvh", "npz", "csv", "mp4")
 _SOURCE = "getup-edit"
 
 
-def export(motion: Motion, character: CharacterSpec, kind: str, stop: Stop | None = None) -> bytes:
-    """The content of a file of one of the FORMATS, or of `glb`; a film ends early once stopped."""
-    if kind == "glb":
-        take = Take(motion.curve.name, 1.0 / motion.control_dt, motion.frames.qpos)
-        return glb_bytes(character, [take])
+def export(
+    motion: Motion,
+    character: CharacterSpec,
+    kind: str,
+    cut: Cut = WHOLE,
+    stop: Stop | None = None,
+    progress: Progress = lambda share: None,
+) -> bytes:
+    """The content of a file of one of the FORMATS; a film ends early once stopped.
+
+    CSV and npz are the whole motion at the control's rate: they hold what was simulated.
+    """
     if kind == "csv":
         return to_csv(motion, character).encode()
     if kind == "npz":
         return to_npz(motion, character)
+    if kind == "glb":
+        fps, qpos = take(motion, cut)
+        return glb_bytes(character, [Take(motion.curve.name, fps, qpos)])
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"motion.{kind}"
         if kind == "bvh":
-            write_bvh(recording(motion, character), path)
+            write_bvh(recording(motion.curve.name, *take(motion, cut), character), path)
         else:
-            _film(motion, character, path, stop or Stop())
+            write_film(motion, character, path, cut, stop or Stop(), progress)
         return path.read_bytes()
 
 
-def recording(motion: Motion, character: CharacterSpec) -> Recording:
-    """The motion on the character's own skeleton: a joint a link, Z up, metres."""
-    model, links = character.model, motion.frames.links.astype(np.float64)
-    parents = model.body_parentid[1:] - 1
-    frames, count = links.shape[:2]
-    world = Rotation.from_quat(links[..., 3:].reshape(-1, 4), scalar_first=True).as_matrix()
-    world = world.reshape(frames, count, 3, 3)
-    local = world.copy()
-    for link, parent in enumerate(parents):
-        if parent >= 0:
-            local[:, link] = world[:, parent].transpose(0, 2, 1) @ world[:, link]
-    rotations = Rotation.from_matrix(local.reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    offsets = model.body_pos[1:].copy()
-    offsets[0] = 0.0
-    translations = np.tile(offsets, (frames, 1, 1))
-    translations[:, 0] = links[:, 0, :3]
-    return Recording(
-        name=motion.curve.name,
-        fps=1.0 / motion.control_dt,
-        joint_names=character.link_names,
-        parents=tuple(int(parent) for parent in parents),
-        offsets=offsets,
-        translations=translations,
-        rotations=rotations.reshape(frames, count, 4),
-        ends=_ends(character),
-        source=_SOURCE,
-    )
+def missing_extras() -> dict[str, str]:
+    """What to install for each format that cannot be written here."""
+    found = {}
+    for kind, require, extra in (("mp4", film.require, "video"), ("glb", require_glb, "glb")):
+        try:
+            require()
+        except ConfigError:
+            found[kind] = f"pip install 'getup-jax[{extra}]'"
+    return found
 
 
 def to_npz(motion: Motion, character: CharacterSpec) -> bytes:
@@ -129,27 +122,3 @@ def to_csv(motion: Motion, character: CharacterSpec) -> str:
 
 def _units() -> list[str]:
     return [f"{name}_{unit}" for name, unit in zip(NAMES, ("m", "rad", "rad"), strict=True)]
-
-
-def _ends(character: CharacterSpec) -> dict[int, np.ndarray]:
-    """The tip of every last link: as far past the middle of its first shape as the joint is."""
-    model = character.model
-    inner = set(model.body_parentid[1:].tolist())
-    return {
-        body - 1: 2.0 * model.geom_pos[model.body_geomadr[body]]
-        for body in range(1, model.nbody)
-        if body not in inner
-    }
-
-
-def _film(motion: Motion, character: CharacterSpec, path: Path, stop: Stop) -> None:
-    imageio = film.require()
-    images = film.pictures(character.model, motion.frames.qpos)
-    with warnings.catch_warnings():
-        # starting ffmpeg is a fork and an exec in one, which is safe
-        warnings.filterwarnings("ignore", message="os.fork", category=RuntimeWarning)
-        fps = round(1.0 / motion.control_dt)
-        with imageio.get_writer(path, fps=fps, macro_block_size=8) as writer:
-            for image in images:
-                stop.check()
-                writer.append_data(film.caption(image, motion.curve.name))

@@ -33,7 +33,14 @@ _DIGITS = 6  # of the start pose
 def curves_of(
     name: str, content: bytes, character: CharacterSpec, stop: Stop | None = None
 ) -> list[CurveFile]:
-    """The curve of every get-up in a motion file, each with the start pose of its own.
+    """The curve of every get-up in a motion file; see `getups_of`."""
+    return [curve_of(getup) for getup in getups_of(name, content, character, stop)]
+
+
+def getups_of(
+    name: str, content: bytes, character: CharacterSpec, stop: Stop | None = None
+) -> list[GetUp]:
+    """Every get-up in a motion file that a curve file can hold.
 
     Raises MotionError with the file's name and no other path, and AbandonedError once it is
     stopped.
@@ -61,7 +68,7 @@ def curves_of(
             "and then stands"
         )
     good = [getup for getup in getups if DURATION_S[0] <= getup.duration <= DURATION_S[1]]
-    return [_curve(getup) for getup in good[:_MOST]]
+    return good[:_MOST]
 
 
 def _check_unpacked(name: str, content: bytes) -> None:
@@ -99,7 +106,8 @@ def _retargeted(path: Path, character: CharacterSpec, stop: Stop) -> Clip:
     return kept(job, lambda job: run_apart(job, stop, _WORKER_BYTES))[0]
 
 
-def _curve(getup: GetUp) -> CurveFile:
+def curve_of(getup: GetUp) -> CurveFile:
+    """The curve of a get-up, with the start pose of its own."""
     assert getup.clip is not None
     curve = reference_curve(getup)
     name = _plain(getup.name)

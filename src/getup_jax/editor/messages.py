@@ -19,14 +19,21 @@ import numpy as np
 from getup_jax.editor.export import FORMATS
 from getup_jax.editor.simulate import Frames, Motion
 from getup_jax.editor.starts import ANYWHERE, Place
+from getup_jax.editor.takes import RATES, WHOLE, Cut
+from getup_jax.editor.verdict import verdict
 from getup_jax.motion.io.curve_file import CurveFile, parse
 from getup_jax.physics.terrain_map import REGIONS
 
 MAX_TEXT_BYTES = 128_000
 MAX_FILE_BYTES = 32_000_000
+_LONGEST_S = 60.0  # of a motion
 SLOTS = 4  # variants that a page may show at once
 _FILE_NAME = re.compile(r"[\w ().+-]{1,100}")
 _LENGTH = struct.Struct("<I")
+
+
+_TYPES = ("simulate", "save", "load", "export", "import", "recording", "cancel")
+_NAMELESS = {"name": "curve", "strategy": "other"}  # where nothing is made that has a name
 
 
 class MessageError(ValueError):
@@ -37,13 +44,15 @@ class MessageError(ValueError):
 class Request:
     """What a page asks for."""
 
-    type: str  # simulate | save | load | export | import
+    type: str  # one of _TYPES
     number: int  # the page's own, comes back with the answer
     slot: int = 0  # variant
     curve: CurveFile | None = None  # simulate, save, export
     place: Place = ANYWHERE
     format: str = ""  # export
-    name: str = ""  # load, import: of the file
+    cut: Cut = WHOLE  # export
+    name: str = ""  # load, import: of the file; recording: of the clip
+    of: int = 0  # cancel: number of the request
     content: str | bytes = b""  # load, import
 
 
@@ -63,18 +72,50 @@ def read(message: str | bytes) -> Request:
     if not isinstance(said, dict):
         raise MessageError("message: expected a JSON object")
     kind, binary = said.get("type"), isinstance(message, bytes)
-    if binary != (kind == "import") or kind not in ("simulate", "save", "load", "export", "import"):
+    if binary != (kind == "import") or kind not in _TYPES:
         raise MessageError(f"message: unknown type {str(kind)[:40]!r}")
     number = _whole(said, "number", 2**31)
     if kind in ("load", "import"):
         return Request(kind, number, name=_file_name(said), content=content or _text(said))
-    curve = parse(said.get("curve"), "curve")
+    if kind == "recording":
+        return Request(kind, number, name=_text(said, "name"))
+    if kind == "cancel":
+        return Request(kind, number, of=_whole(said, "of", 2**31))
+    curve = _curve(said, kind)
     form = said.get("format", "")
     if kind == "export" and form not in FORMATS:
         raise MessageError(f"format: expected one of {', '.join(FORMATS)}")
     place = Place(_whole(said, "region", len(REGIONS), 0), _whole(said, "place", 10_000, 0))
     slot = _whole(said, "slot", SLOTS, 0)
-    return Request(kind, number, slot, curve, place, form)
+    return Request(kind, number, slot, curve, place, form, _cut(said))
+
+
+def _curve(said: dict[str, Any], kind: str) -> CurveFile:
+    """The curve of a request; names matter only for files."""
+    curve = said.get("curve")
+    if kind != "save" and isinstance(curve, dict):
+        name = {"name": said["name"]} if kind == "export" and "name" in said else {}
+        curve = {**_NAMELESS, **curve, **name}
+    return parse(curve, "curve")
+
+
+def _cut(said: dict[str, Any]) -> Cut:
+    """Which part is exported, and how."""
+    rate, turn = said.get("rate"), said.get("turn", False)
+    if rate is not None and (isinstance(rate, bool) or rate not in RATES):
+        raise MessageError(f"rate: expected one of {', '.join(map(str, RATES))}")
+    if not isinstance(turn, bool):
+        raise MessageError("turn: expected true or false")
+    end = None if said.get("to") is None else _seconds(said, "to")
+    return Cut(rate, _seconds(said, "from"), end, turn)
+
+
+def _seconds(said: dict[str, Any], key: str) -> float:
+    value = said.get(key, 0.0)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not 0.0 <= value <= _LONGEST_S:  # which NaN is not
+        raise MessageError(f"{key}: expected seconds from 0 to {_LONGEST_S:g}")
+    return float(value)
 
 
 def pack(header: dict[str, Any], payload: bytes) -> bytes:
@@ -102,18 +143,6 @@ def result_message(request: Request, motion: Motion, seconds: float) -> str:
     header |= {"success": success, "verdict": verdict(motion), "scores": scores}
     gap = math.degrees(motion.start_gap_rad)
     return json.dumps({**header, "start_gap_deg": gap, "server_s": seconds})
-
-
-def verdict(motion: Motion) -> str:
-    """How the episode ended, in a few words."""
-    if motion.scores["success"] == 1.0:
-        return f"stands after {motion.scores['stand_time_s']:.1f} s"
-    ended = int(motion.frames.running.sum())
-    if ended == len(motion.time):
-        return "does not stand at the end"
-    recent = motion.task_reward[max(0, ended - 3) : ended]
-    cause = "too far from the curves" if recent.max() < 0.1 else "head on the floor"
-    return f"fails at {motion.time[ended - 1]:.1f} s: {cause}"
 
 
 def _split(message: bytes) -> tuple[str, bytes]:
@@ -145,8 +174,8 @@ def _file_name(said: dict[str, Any]) -> str:
     return name
 
 
-def _text(said: dict[str, Any]) -> str:
-    text = said.get("text", "")
+def _text(said: dict[str, Any], key: str = "text") -> str:
+    text = said.get(key, "")
     if not isinstance(text, str):
-        raise MessageError("text: expected the text of a file")
+        raise MessageError(f"{key}: expected a text")
     return text

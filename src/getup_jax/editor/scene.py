@@ -7,11 +7,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from getup_jax.config import ConfigError
 from getup_jax.core.resources import asset_path
+from getup_jax.editor.export import missing_extras
 from getup_jax.editor.simulate import Simulator
 from getup_jax.editor.starts import lies, reference_curve
-from getup_jax.evaluation.film import require
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.getup.plot import strategy_curves
 from getup_jax.motion.io import curve_file
@@ -66,7 +65,7 @@ def describe(simulator: Simulator, loaded: LoadedPolicy) -> dict[str, Any]:
             for name, values in bands.items()
         },
         "terrain": {"regions": REGIONS, "places": starts.places} if starts.places else None,
-        "film": _can_film(),
+        "formats": missing_extras(),
     }
 
 
@@ -123,11 +122,3 @@ def ground(simulator: Simulator, xy: np.ndarray) -> dict[str, Any] | None:
         "points": len(side),
         "heights": np.round(heights.ravel(), 4).tolist(),
     }
-
-
-def _can_film() -> bool:
-    try:
-        require()
-    except ConfigError:
-        return False
-    return True

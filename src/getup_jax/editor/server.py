@@ -43,6 +43,7 @@ class EditorError(ValueError):
 def edit_command(args: argparse.Namespace) -> int:
     """The command line of `getup-edit`; returns the exit code."""
     loaded = checkpoint.load_policy(args.ckpt)
+    _check_task(loaded)
 
     def build(log: Callable[[str], None]) -> tuple[Session, dict[str, Any]]:
         return build_session(loaded, log)
@@ -51,6 +52,16 @@ def edit_command(args: argparse.Namespace) -> int:
     with contextlib.suppress(KeyboardInterrupt):
         asyncio.run(app.run(args.host, args.port))
     return 0
+
+
+def _check_task(loaded: LoadedPolicy) -> None:
+    """Raise EditorError where the policy follows no curves."""
+    if loaded.config.composite_motion:
+        raise EditorError(
+            f"{loaded.path}: a policy of composite motion, which follows reference motions and "
+            "goals, not the curves of a get-up; watch it with getup-eval --ckpt ... --video "
+            "FILE.mp4, and open a policy that gets up here, as getup-edit --ckpt flat does"
+        )
 
 
 def build_session(
@@ -172,6 +183,8 @@ class App:
                 raise messages.MessageError("not ready yet; ask again when the page says ready")
             if request.type == "simulate":
                 self._session.submit(page, request, box.put_from_thread)
+            elif request.type == "cancel":
+                self._work.cancel(request, box)
             else:
                 self._work.start(request, self._session, box)
         except Exception as error:  # told to the page, whose connection lives

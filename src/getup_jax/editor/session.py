@@ -143,5 +143,7 @@ def error_message(request: Request | None, error: Exception) -> str:
 
 
 def _key(request: Request) -> str:
+    """What a motion depends on; names change none."""
     assert request.curve is not None
-    return json.dumps([request.curve.plain(), dataclasses.astuple(request.place)])
+    named = dataclasses.replace(request.curve, name="", strategy="")
+    return json.dumps([named.plain(), dataclasses.astuple(request.place)])

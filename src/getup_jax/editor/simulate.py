@@ -59,6 +59,7 @@ class Motion:
     control_dt: float  # s
     scores: dict[str, float]
     start_gap_rad: float
+    start_pose: np.ndarray  # [7 + J] at 0 s, before the first control step
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -128,6 +129,7 @@ class Simulator:
         )
         region = None if self.starts.places == 0 else np.full(1, place.region, np.int32)
         carry = self.start(world, zero, zero, followed, region)
+        begin = np.asarray(carry.state.physics.kinematics.qpos[0])
         traces, parts, total = [], [], self.steps(curve)
         for first in range(0, total, CHUNK):
             carry, trace = self.advance(world, self.policy, carry)
@@ -147,6 +149,7 @@ class Simulator:
             control_dt=self.control_dt,
             scores=self._scores(whole),
             start_gap_rad=self.starts.gap(curve),
+            start_pose=begin,
         )
 
     def finish(self, curve: CurveFile, place: Place = ANYWHERE) -> Motion:

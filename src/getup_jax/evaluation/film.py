@@ -150,6 +150,9 @@ class Camera:
         """Raises ConfigError where this machine cannot render."""
         self._model = copy.copy(model)
         self._model.vis.quality.shadowsize = _SHADOW
+        frame = self._model.vis.global_  # the largest picture that can be drawn
+        frame.offheight = max(frame.offheight, size[0])
+        frame.offwidth = max(frame.offwidth, size[1])
         self._data, self._camera = mujoco.MjData(self._model), mujoco.MjvCamera()
         self._camera.distance, self._camera.elevation = 3.4, -14.0
         self._renderer = _renderer(self._model, size)

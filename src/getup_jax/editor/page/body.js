@@ -2,13 +2,17 @@
 
 import { BoxGeometry, CapsuleGeometry, Color, Group, Mesh, MeshLambertMaterial, SphereGeometry } from "./vendor/three.min.js";
 
-export const TINTS = ["#3f74b5", "#b8862b", "#8a55ad", "#2f8f6b"]; // of the variants
+export const TINTS = ["#3f74b5", "#b8862b", "#8a55ad", "#2f8f6b", "#c0392b"]; // of the variants, and of the source
+export const SOURCE = 4; // the tint of a clip's own motion
 
 export class Body {
   constructor(shapes, links) {
     this.group = new Group();
     this.links = Array.from({ length: links }, () => new Group());
     this.group.add(...this.links);
+    /** @type {string | null} what it shows */
+    this.shown = null;
+    /** @type {any[]} */
     this.materials = [];
     for (const shape of shapes) this.links[shape.link].add(this.mesh(shape));
   }

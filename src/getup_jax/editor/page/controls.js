@@ -1,163 +1,161 @@
 // The controls below the curves and in the header; they change the store and follow it.
 
-import { FEATURES, shifted } from "./spline.js";
+import { alike } from "./alike.js";
+import { duration, DURATION_S, keptDuration, keptName } from "./content.js";
+import { group, option } from "./dom.js";
+import * as edits from "./edits.js";
+import { clamp, LIES } from "./features.js";
+import { say } from "./notice.js";
+import { startGap } from "./starts.js";
 
-const LIES = ["prone", "supine", "side"];
+/** @import { Curve } from "./types.js" */
 
 export class Controls {
-  constructor(elements, store, onBand) {
-    Object.assign(this, { elements, store, imported: [] });
-    const { curve, band, start, region, place, duration, seconds, shift, name } = elements;
+  /** @param {Record<string, any>} elements @param {import("./store.js").Store} store @param {() => void} onGuide */
+  constructor(elements, store, onGuide) {
+    this.elements = elements;
+    this.store = store;
+    /** @type {any} */
+    this.scene = null;
+    this.listed = "";
+    const { curve, band, start, region, place, duration: slider, seconds, shift } = elements;
     curve.addEventListener("change", () => this.choose(curve.value));
-    band.addEventListener("change", onBand);
+    band.addEventListener("change", onGuide);
     start.addEventListener("change", () => this.startFrom(start.value));
-    region.addEventListener("change", () => store.commit((v) => { v.region = Number(region.value); }));
-    place.addEventListener("change", () => store.commit((v) => {
-      v.place = Math.min(Math.max(Math.round(place.value) || 1, 1), this.scene.terrain.places) - 1;
-    }));
-    duration.addEventListener("input", () => this.last(Number(duration.value), false));
-    duration.addEventListener("change", () => store.commit());
-    seconds.addEventListener("change", () => this.last(Number(seconds.value), true));
-    shift.addEventListener("input", () => this.shift(Number(shift.value)));
-    shift.addEventListener("change", () => this.endShift());
-    name.addEventListener("change", () => store.commit((v) => { v.curve.name = name.value.trim() || "my_rise"; }));
+    region.addEventListener("change", () => store.commit((now) => ({ ...now, region: Number(region.value) })));
+    place.addEventListener("change", () => this.place(Number(place.value)));
+    slider.addEventListener("input", () => store.live((now) => edits.last(now, Number(slider.value))));
+    slider.addEventListener("change", () => store.commit(null, { tag: "duration" }));
+    seconds.addEventListener("change", () => this.last(Number(seconds.value)));
+    shift.addEventListener("input", () => store.live((now) => edits.shift(now, Number(shift.value))));
+    shift.addEventListener("change", () => {
+      shift.value = 0;
+      store.commit();
+    });
+    this.listenToName(elements.name);
     elements.undo.addEventListener("click", () => store.undo());
     elements.redo.addEventListener("click", () => store.redo());
-    elements.reset.addEventListener("click", () => store.commit((v) => { v.curve = structuredClone(v.reference); }));
-    elements.mirror.addEventListener("click", () => this.mirror());
+    elements.reset.addEventListener("click", () => store.commit(edits.reset));
+    elements.mirror.addEventListener("click", () => store.commit((now) => edits.mirror(now, this.scene.mirrored, this.scene.mirror)));
   }
 
-  // The library, the starts and the guides that the server knows.
+  /** What a file's name may not have cannot be typed. @param {HTMLInputElement} name */
+  listenToName(name) {
+    name.addEventListener("input", (event) => {
+      if (/** @type {InputEvent} */ (event).isComposing) return;
+      const kept = keptName(name.value);
+      if (kept === name.value) return;
+      const left = (name.selectionStart ?? kept.length) - (name.value.length - kept.length);
+      name.value = kept;
+      name.setSelectionRange(left, left);
+      say("A name has letters, digits, spaces and _ - . @ : ~ alone.");
+    });
+    name.addEventListener("change", () => this.rename(name));
+  }
+
+  /** @param {HTMLInputElement} name */
+  rename(name) {
+    const kept = keptName(name.value).trim() || "my_rise";
+    name.value = kept;
+    this.store.commit((now) => edits.withCurve(now, { name: kept }));
+  }
+
+  /** The starts and the guides that the server knows. @param {any} scene */
   fill(scene) {
     this.scene = scene;
-    this.fillCurves();
-    const { band, start, region, place } = this.elements;
-    band.replaceChildren(option("", "none"), ...Object.entries(scene.bands).map(([name, { count }]) => option(name, `${name} (${count})`)));
-    start.replaceChildren(...LIES.map((lies) => {
-      const names = scene.starts.filter((s) => s.lies === lies).map((s) => s.name);
-      const all = scene.mirrored === null ? names : names.flatMap((n) => [n, scene.mirrored + n]);
-      return group(lies, all.map((n) => option(n, n)));
-    }).filter((g) => g.children.length));
-    region.replaceChildren(...(scene.terrain?.regions ?? ["flat"]).map((name, i) => option(i, name)));
-    region.disabled = scene.terrain === null;
+    this.listed = "";
+    const { band, region, place } = this.elements, guide = band.value;
+    const bands = Object.entries(scene.bands).map(([name, { count }]) => option(name, `${name} (${count})`));
+    band.replaceChildren(option("", "none"), ...bands);
+    band.value = guide;
+    region.replaceChildren(...(scene.terrain?.regions ?? ["flat"]).map((/** @type {string} */ name, /** @type {number} */ i) => option(String(i), name)));
+    region.disabled = place.disabled = scene.terrain === null;
     region.title = scene.terrain ? "Where it gets up" : "This policy was trained on flat ground only";
-    place.disabled = scene.terrain === null;
     place.max = scene.terrain?.places ?? 1;
   }
 
+  /** Curves to begin with: the library's by how they lie, the drawn ones, the imported ones. */
   fillCurves() {
-    const { starts, curves } = this.scene;
-    const references = new Map(starts.map((s) => [s.name, s.lies]));
-    const of = (lies) => curves.flatMap((c, i) => (references.get(c.name) === lies ? [option(`c${i}`, c.name)] : []));
-    const drawn = curves.flatMap((c, i) => (references.has(c.name) ? [] : [option(`c${i}`, c.name)]));
-    const own = this.imported.map((c, i) => option(`i${i}`, c.name));
-    const groups = [...LIES.map((lies) => group(lies, of(lies))), group("drawn", drawn), group("imported", own)];
+    const imported = this.store.project?.imported ?? [], { starts, curves } = this.scene;
+    const listed = `${this.store.project?.id} ${imported.length}`;
+    if (listed === this.listed) return;
+    this.listed = listed;
+    const references = new Map(starts.map((/** @type {any} */ s) => [s.name, s.lies]));
+    const of = (/** @type {string | undefined} */ lies) => curves.flatMap((/** @type {Curve} */ c, /** @type {number} */ i) => (references.get(c.name) === lies ? [option(`c${i}`, c.name)] : []));
+    const own = imported.map(({ curve, file }, i) => option(`i${i}`, `${curve.name} (${file}, ${curve.durations[0].toFixed(1)} s, ${alike(curve, curves)})`));
+    const groups = [...LIES.map((lies) => group(lies, of(lies))), group("drawn", of(undefined)), group("imported", own)];
     this.elements.curve.replaceChildren(option("", "choose …"), ...groups.filter((g) => g.children.length));
   }
 
-  addImported(curves) {
-    this.imported.push(...curves);
-    this.fillCurves();
-  }
-
+  /** @param {string} value */
   choose(value) {
-    const list = value[0] === "c" ? this.scene.curves : this.imported;
-    const curve = list[Number(value.slice(1))];
-    if (curve) this.store.choose(curve);
+    const i = Number(value.slice(1)), curve = value[0] === "c" ? this.scene.curves[i] : this.store.project?.imported[i]?.curve;
+    if (curve) this.store.commit((now) => edits.choose(now, curve));
   }
 
-  // The first points follow the new start pose, since curve and pose must fit.
+  /** @param {string} name */
   startFrom(name) {
-    const plain = this.scene.mirrored && name.startsWith(this.scene.mirrored) ? name.slice(this.scene.mirrored.length) : name;
-    const first = [...this.scene.starts.find((s) => s.name === plain).first];
-    if (plain !== name) first[1] = 180 - first[1];
-    this.store.commit(({ curve }) => {
-      curve.start = name;
-      delete curve.pose;
-      FEATURES.forEach((feature, i) => { curve[feature][0] = first[i]; });
-    });
+    const first = edits.firstOf(this.scene, name), gap = startGap(this.store.now, first);
+    this.store.commit((now) => edits.startFrom(now, name, first));
+    if (gap > this.scene.match_deg) say(`The curves now begin ${gap.toFixed(0)}° from where they did: this pose does not lead into them by itself.`);
   }
 
-  last(value, done) {
-    const [low, high] = this.scene.limits.duration;
-    const change = (v) => { v.curve.durations = [Math.min(Math.max(Number(value.toFixed(2)) || low, low), high)]; };
-    if (done) this.store.commit(change);
-    else this.store.live(change);
+  /** @param {number} typed */
+  last(typed) {
+    const kept = keptDuration(typed);
+    this.store.commit((now) => edits.last(now, typed));
+    this.elements.seconds.value = kept;
+    if (kept !== typed) say(`Duration: from ${DURATION_S[0]} to ${DURATION_S[1]} s; it is ${kept} s now.`);
   }
 
-  shift(amount) {
-    this.base ??= structuredClone(this.store.curve);
-    this.store.live(({ curve }) => {
-      FEATURES.forEach((feature, i) => {
-        curve[feature] = shifted(this.base[feature], amount).map((v) => Number(v.toFixed(i ? 1 : 3)));
-      });
-    });
+  /** @param {number} typed */
+  place(typed) {
+    const kept = clamp(Math.round(typed) || 1, 1, this.scene.terrain.places);
+    this.store.commit((now) => ({ ...now, place: kept - 1 }));
+    this.elements.place.value = kept;
+    if (kept !== typed) say(`Place: a whole number from 1 to ${this.scene.terrain.places}; it is ${kept} now.`);
   }
 
-  endShift() {
-    this.base = null;
-    this.elements.shift.value = 0;
-    this.store.commit();
-  }
-
-  mirror() {
-    const { mirrored, mirror } = this.scene;
-    this.store.commit(({ curve }) => {
-      curve.side_angle = curve.side_angle.map((v) => Number((180 - v).toFixed(3)));
-      if (curve.pose) curve.pose = mirrorPose(curve.pose, mirror);
-      else if (mirrored === null) return; // on irregular ground the places are what they are
-      else curve.start = curve.start.startsWith(mirrored) ? curve.start.slice(mirrored.length) : mirrored + curve.start;
-    });
-  }
-
-  // Shows the store.
+  /** Shows the store. */
   show() {
-    const { elements, store } = this;
-    const { curve, region, place } = store.current;
-    const [seconds] = curve.durations;
-    if (document.activeElement !== elements.name) elements.name.value = curve.name;
+    const { elements, store } = this, { now, current } = store, seconds = duration(now);
+    if (document.activeElement !== elements.name) elements.name.value = now.curve.name;
     elements.duration.value = seconds;
     if (document.activeElement !== elements.seconds) elements.seconds.value = seconds;
-    this.showStart(curve);
-    elements.region.value = region;
-    elements.place.value = place + 1;
-    elements.undo.disabled = !store.past.length;
-    elements.redo.disabled = !store.future.length;
-    const chosen = [...elements.curve.options].find((o) => o.textContent === store.current.reference.name);
+    elements.region.value = now.region;
+    if (document.activeElement !== elements.place) elements.place.value = now.place + 1;
+    elements.undo.disabled = !current.history.past.length && !store.draft;
+    elements.redo.disabled = !current.history.future.length;
+    this.fillCurves();
+    if (!store.draft) this.fillStarts();
+    const chosen = [...elements.curve.options].find((o) => this.named(o.value) === now.reference.name);
     elements.curve.value = chosen ? chosen.value : "";
   }
 
-  // A start that the server does not list, a pose of the file's own, is listed as it is.
-  showStart(curve) {
-    const { start } = this.elements;
-    start.querySelector("[data-own]")?.remove();
-    if (![...start.options].some((o) => o.value === curve.start) || curve.pose) {
-      const own = option(curve.start, `${curve.start} (its own pose)`);
-      own.dataset.own = "";
-      own.disabled = true;
-      start.append(own);
-      own.selected = true;
-    } else {
-      start.value = curve.start;
-    }
+  /** @param {string} value of an option */
+  named(value) {
+    const i = Number(value.slice(1));
+    return value[0] === "c" ? this.scene.curves[i].name : value[0] === "i" ? this.store.project?.imported[i].curve.name : null;
   }
-}
 
-function mirrorPose(pose, { joint, sign }) {
-  const root = [1, -1, 1, 1, -1, 1, -1].map((s, i) => s * pose[i]);
-  return [...root, ...joint.map((j, i) => sign[i] * pose[7 + j])];
-}
-
-function option(value, text) {
-  const element = document.createElement("option");
-  element.value = value;
-  element.textContent = text;
-  return element;
-}
-
-function group(label, options) {
-  const element = document.createElement("optgroup");
-  element.label = label;
-  element.append(...options);
-  return element;
+  /** Every start with how far it is from where the curves begin; one that the server does not list as it is. */
+  fillStarts() {
+    const { start } = this.elements, { scene, store } = this, { curve } = store.now;
+    const named = (/** @type {string} */ name) => {
+      const gap = startGap(store.now, edits.firstOf(scene, name));
+      return option(name, name === curve.start && !curve.pose ? name : gap > scene.match_deg ? `${name} – ${gap.toFixed(0)}° off` : name);
+    };
+    const groups = LIES.map((lies) => {
+      const names = scene.starts.filter((/** @type {any} */ s) => s.lies === lies).map((/** @type {any} */ s) => s.name);
+      const all = scene.mirrored === null ? names : names.flatMap((/** @type {string} */ n) => [n, scene.mirrored + n]);
+      return group(lies, all.map(named));
+    }).filter((g) => g.children.length);
+    const known = groups.some((g) => [...g.children].some((o) => /** @type {HTMLOptionElement} */ (o).value === curve.start));
+    const own = known && !curve.pose ? [] : [option(curve.start, `${curve.start} (${curve.pose ? "its own pose" : "unknown here"})`, true)];
+    const text = JSON.stringify([groups.map((g) => g.textContent), own.map((o) => o.textContent)]);
+    if (text !== this.startsShown) start.replaceChildren(...groups, ...own);
+    this.startsShown = text;
+    if (own.length) start.selectedIndex = start.options.length - 1;
+    else start.value = curve.start;
+  }
 }

@@ -1,64 +1,68 @@
-// Saving, opening, importing and exporting.
+// Saving, opening and importing; several files wait for each other.
+
+import { $, download } from "./dom.js";
+import { say } from "./notice.js";
+
+/** @import { Curve, Recording } from "./types.js" */
 
 export class Files {
-  // say(text, bad); taken(curves, from) with the curves of a file
-  constructor({ link, store, say, taken, elements }) {
-    Object.assign(this, { link, store, say, taken, elements });
-    elements.save.addEventListener("click", () => this.save());
-    elements.open.addEventListener("click", () => elements.curveFile.click());
-    elements.import.addEventListener("click", () => elements.motionFile.click());
-    for (const input of [elements.curveFile, elements.motionFile]) {
-      input.addEventListener("change", () => { this.take(input.files[0]); input.value = ""; });
+  /** @param {import("./link.js").Link} link @param {import("./store.js").Store} store @param {{ opened: (curves: Curve[], file: string) => void, imported: (curves: Curve[], recordings: (Recording | null)[], file: string) => void, project: (text: string, file: string) => void }} to */
+  constructor(link, store, to) {
+    this.link = link;
+    this.store = store;
+    this.to = to;
+    this.queue = Promise.resolve();
+    $("save").addEventListener("click", () => this.save());
+    $("open").addEventListener("click", () => $("file-curve").click());
+    $("import").addEventListener("click", () => $("file-motion").click());
+    for (const input of [$("file-curve"), $("file-motion"), $("file-project")]) {
+      input.addEventListener("change", () => {
+        this.take([...input.files]);
+        input.value = "";
+      });
     }
-    elements.export.addEventListener("change", () => {
-      this.export(elements.export.value);
-      elements.export.value = "";
-    });
     document.addEventListener("dragover", (event) => event.preventDefault());
     document.addEventListener("drop", (event) => {
       event.preventDefault();
-      this.take(event.dataTransfer.files[0]);
+      this.take([...(event.dataTransfer?.files ?? [])]);
     });
   }
 
-  save() { return this.receive({ type: "save", curve: this.store.curve }, "saved"); }
-
-  export(format) {
-    const { curve, region, place } = this.store.current;
-    if (format === "mp4") this.say("Filming; this takes a while. You can go on editing.");
-    return this.receive({ type: "export", format, curve, region, place }, "exported");
-  }
-
-  async receive(request, done) {
+  async save() {
     try {
-      const file = await this.link.ask(request);
+      const file = await this.link.ask({ type: "save", curve: this.store.now.curve });
       download(file.name, file.payload);
-      this.say(`${file.name} ${done}`);
-    } catch (error) {
-      this.say(error.message, true);
+      say(`${file.name} saved`);
+    } catch (error) { say(/** @type {Error} */ (error).message, true); }
+  }
+
+  /** One after the other, however many are given and whenever. @param {File[]} files */
+  take(files) {
+    for (const file of files) {
+      this.queue = this.queue.then(() => this.read(file)).catch((error) => say(error.message, true));
     }
   }
 
-  async take(file) {
-    if (!file) return;
-    try {
-      const curve = /\.ya?ml$/i.test(file.name);
-      if (!curve) this.say(`Reading ${file.name} …`);
-      const name = file.name.replace(/[^\w ().+-]/g, "_").replace(/^\.+/, "");
-      const answer = curve
-        ? await this.link.ask({ type: "load", name, text: await file.text() })
-        : await this.link.ask({ type: "import", name }, await file.arrayBuffer());
-      this.taken(answer.curves, file.name, !curve);
-    } catch (error) {
-      this.say(error.message, true);
+  /** @param {File} file */
+  async read(file) {
+    const name = file.name.replace(/[^\p{L}\p{N}_ ().+-]/gu, "_").replace(/^\.+/, "").slice(-100);
+    if (/\.getup\.json$/i.test(file.name)) return this.to.project(await file.text(), file.name);
+    if (/\.ya?ml$/i.test(file.name)) {
+      const answer = await this.link.ask({ type: "load", name, text: await file.text() });
+      return this.to.opened(answer.curves, file.name);
     }
+    say(`Reading ${file.name} …`);
+    const answer = await this.link.ask({ type: "import", name }, await file.arrayBuffer());
+    return this.to.imported(answer.curves, recordings(answer), file.name);
   }
 }
 
-function download(name, payload) {
-  const anchor = document.createElement("a");
-  anchor.href = URL.createObjectURL(new Blob([payload]));
-  anchor.download = name;
-  anchor.click();
-  setTimeout(() => URL.revokeObjectURL(anchor.href), 10_000);
+/** The motions behind the curves, which follow each other in the payload. @param {any} answer @returns {(Recording | null)[]} */
+export function recordings({ recordings: heads = [], payload }) {
+  let at = 0;
+  return heads.map((/** @type {any} */ { fps, total, links }) => {
+    const size = total * (links * 7 + 3), frames = new Float32Array(payload.slice(4 * at, 4 * (at + size)));
+    at += size;
+    return { fps, total, links, frames };
+  });
 }

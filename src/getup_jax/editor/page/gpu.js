@@ -6,15 +6,23 @@ const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 export function drawsInSoftware() {
   const gl = document.createElement("canvas").getContext("webgl2");
   const info = gl?.getExtension("WEBGL_debug_renderer_info");
-  const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
+  const name = gl && info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
   gl?.getExtension("WEBGL_lose_context")?.loseContext();
   return SOFTWARE.test(name);
 }
 
 // Follows one picture at a time through the renderer, which works beside the page.
 export class Fence {
+  /** @param {any} gl */
   constructor(gl) {
-    Object.assign(this, { gl, sync: null, took: 0, free: 0, after: [] });
+    this.gl = gl;
+    /** @type {any} */
+    this.sync = null;
+    this.took = 0;
+    this.free = 0;
+    this.began = 0;
+    /** @type {(() => void)[]} */
+    this.after = [];
   }
 
   get waiting() { return this.sync !== null; }
@@ -29,7 +37,7 @@ export class Fence {
     else setTimeout(() => this.look(), 1);
   }
 
-  // Calls once the picture at hand is drawn.
+  /** Calls once the picture at hand is drawn. @param {() => void} call */
   then(call) {
     if (this.waiting) this.after.push(call);
     else call();

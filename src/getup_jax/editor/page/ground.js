@@ -54,8 +54,3 @@ function landscape({ origin, step, points, heights }) {
   geometry.computeVertexNormals();
   return geometry;
 }
-
-export function heightAt({ origin, step, points, heights }, x, y) {
-  const clamp = (v) => Math.min(Math.max(Math.round(v), 0), points - 1);
-  return heights[clamp((y - origin[1]) / step) * points + clamp((x - origin[0]) / step)];
-}

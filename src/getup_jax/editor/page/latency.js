@@ -2,10 +2,18 @@
 // its event, to the moment at which the browser and its renderer have drawn the frames.
 
 export class Latency {
-  // report(first, whole): milliseconds; whole is null until the whole motion is drawn
-  constructor(report) { Object.assign(this, { report, request: null, first: null, due: new Set() }); }
+  /** @param {(first: number, whole: number | null) => void} report milliseconds; whole is null until the whole motion is drawn */
+  constructor(report) {
+    this.report = report;
+    /** @type {any} */
+    this.request = null;
+    /** @type {number | null} */
+    this.first = null;
+    /** @type {Set<string>} */
+    this.due = new Set();
+  }
 
-  // A gesture ended; what an older one still waits for is no longer measured.
+  /** A gesture ended; what an older one still waits for is no longer measured. @param {any} request */
   begin(request) { Object.assign(this, { request, first: null, due: new Set() }); }
 
   // "first" or "whole" has come and is to be drawn.

@@ -6,7 +6,10 @@ export class Link extends EventTarget {
   constructor() {
     super();
     this.number = 0;
+    /** @type {Map<number, { resolve: (answer: any) => void, reject: (error: Error) => void }>} */
     this.waiting = new Map();
+    /** @type {WebSocket} */
+    this.socket;
     this.connect();
   }
 
@@ -21,6 +24,7 @@ export class Link extends EventTarget {
     this.socket.onclose = (event) => this.lost(event);
   }
 
+  /** @param {CloseEvent} event */
   lost(event) {
     for (const { reject } of this.waiting.values()) reject(new Error("the connection was lost"));
     this.waiting.clear();
@@ -30,14 +34,14 @@ export class Link extends EventTarget {
 
   get open() { return this.socket.readyState === WebSocket.OPEN; }
 
-  // Sends a request that frames answer; returns its number.
+  /** Sends a request that frames answer; returns its number. @param {object} request */
   send(request) {
     this.number += 1;
     if (this.open) this.socket.send(JSON.stringify({ ...request, number: this.number }));
     return this.number;
   }
 
-  // Sends a request with one answer, and a file with it where there is one.
+  /** Sends a request with one answer, and a file with it where there is one. @param {object} request @param {ArrayBuffer | null} file @returns {Promise<any>} */
   ask(request, file = null) {
     if (!this.open) return Promise.reject(new Error("not connected"));
     this.number += 1;
@@ -46,10 +50,11 @@ export class Link extends EventTarget {
     return new Promise((resolve, reject) => this.waiting.set(this.number, { resolve, reject }));
   }
 
+  /** @param {string | ArrayBuffer} data */
   receive(data) {
     const message = typeof data === "string" ? JSON.parse(data) : unpacked(data);
     const waits = this.waiting.get(message.number);
-    if (waits) {
+    if (waits && message.type !== "progress") {
       this.waiting.delete(message.number);
       if (message.type === "error") waits.reject(new Error(message.text));
       else waits.resolve(message);
@@ -58,9 +63,11 @@ export class Link extends EventTarget {
     this.tell(message.type, message);
   }
 
+  /** @param {string} type @param {object} detail */
   tell(type, detail) { this.dispatchEvent(new CustomEvent(type, { detail })); }
 }
 
+/** @param {string} header @param {ArrayBuffer} file */
 function packed(header, file) {
   const text = new TextEncoder().encode(header);
   const whole = new Uint8Array(4 + text.length + file.byteLength);
@@ -70,6 +77,7 @@ function packed(header, file) {
   return whole;
 }
 
+/** @param {ArrayBuffer} data */
 function unpacked(data) {
   const length = new DataView(data).getUint32(0, true);
   const text = new TextDecoder().decode(new Uint8Array(data, 4, length));

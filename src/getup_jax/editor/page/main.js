@@ -1,203 +1,225 @@
-// The page: connects the store, the server, the curves and the views.
+// The page: connects the store, the server, the curves and the views. What is shown follows from the store
+// and the results alone: an edit makes a request, its answer a result, and both are drawn.
 
+import { alike } from "./alike.js";
+import { Autosave } from "./autosave.js";
+import { reached } from "./contacts.js";
+import { duration } from "./content.js";
 import { Controls } from "./controls.js";
+import { $ } from "./dom.js";
+import { Exports } from "./export.js";
 import { Files } from "./files.js";
+import { Graph } from "./graph.js";
 import { Latency } from "./latency.js";
 import { Link } from "./link.js";
-import { Panels } from "./panels.js";
+import { say } from "./notice.js";
 import { Player } from "./player.js";
-import { Report } from "./report.js";
-import { Simulations } from "./simulations.js";
+import { project } from "./project.js";
+import { Projects } from "./projects.js";
+import { Report, wishWords } from "./report.js";
+import { Results } from "./results.js";
+import { help, listen } from "./shortcuts.js";
+import { shortcuts } from "./keyboard.js";
+import { Sources } from "./sources.js";
+import { Stage } from "./stage.js";
+import { Storage } from "./storage.js";
 import { Store } from "./store.js";
-import { Strip } from "./strip.js";
 import { Tabs } from "./tabs.js";
 import { watchTheme } from "./theme.js";
-import { View } from "./view.js";
+import { Tools } from "./tools.js";
+import { choose } from "./edits.js";
 
-const $ = (id) => document.getElementById(id);
-const store = new Store();
-const link = new Link();
-const simulations = new Simulations(link, store);
+const store = new Store(), storage = new Storage(), autosave = new Autosave(storage, store, say);
+const link = new Link(), results = new Results(link, store), sources = new Sources(link, store);
 const due = { curves: false, strip: false }; // to be drawn again
-let scene = null, view = null, strip = null, faced = "";
+/** @type {any} */
+let scene = null;
 
 const model = {
-  store, motions: simulations.motions,
+  store, results,
   time: () => player.time,
-  span: () => (scene && store.variants.length ? store.curve.durations[0] + scene.stand_time_s : 1),
+  span: () => (scene && store.project ? store.longest + scene.stand_time_s : 1),
   get controlDt() { return scene?.control_dt ?? 0; },
   band: () => scene?.bands[$("band").value],
+  recording: () => ($("source").checked ? sources.recording : null),
+  get range() { return /** @type {[number, number]} */ ([player.from, player.to]); },
+  frames: () => graph?.frames ?? false,
 };
 
 const report = new Report({ verdict: $("verdict"), scores: $("scores"), latency: $("latency") });
-const latency = new Latency((first, whole) => report.latency(first, whole, model.span()));
-const panels = new Panels($("panels"), model, (time) => player.seek(time));
-const player = new Player({ play: $("play"), scrub: $("scrub"), clock: $("clock"), speed: $("speed"), loop: $("loop") }, model, showFrame);
-const tabs = new Tabs($("variants"), store, (slot) => simulations.remove(slot));
+const latency = new Latency((/** @type {number} */ first, /** @type {number | null} */ whole) => report.latency(first, whole, model.span()));
+const parts = Object.fromEntries(["play", "scrub", "clock", "speed", "loop", "first", "back", "on", "in", "out", "range"].map((id) => [id, $(id)]));
+/** @type {Graph} */
+let graph;
+const player = new Player(parts, model, showFrame, () => { due.curves = true; });
+graph = new Graph($("panels"), model, (time) => player.seek(time));
+const tools = new Tools($("tools"), graph, player);
+const tabs = new Tabs($("variants"), store);
 const ids = ["curve", "band", "start", "region", "place", "duration", "seconds", "shift", "name", "undo", "redo", "reset", "mirror"];
-const controls = new Controls(Object.fromEntries(ids.map((id) => [id, $(id)])), store, () => panels.draw());
-const files = new Files({
-  link, store, say, taken,
-  elements: { save: $("save"), open: $("open"), import: $("import"), export: $("export"), curveFile: $("file-curve"), motionFile: $("file-motion") },
+const controls = new Controls(Object.fromEntries(ids.map((id) => [id, $(id)])), store, () => { due.curves = true; });
+const stage = new Stage(store, results, player, sources);
+const projects = new Projects(storage, store, autosave, () => scene.curves[0]);
+new Exports(link, store, { scene: () => scene, range: () => model.range, still: () => stage.still() });
+const files = new Files(link, store, {
+  opened: (curves, file) => taken(curves, file),
+  imported(curves, recordings, file) {
+    store.addImported(curves.map((curve, i) => ({ curve, file, recording: recordings[i] ?? null })));
+    taken(curves, file);
+  },
+  project: (text, file) => projects.import(text, file),
 });
+const keys = shortcuts({ store, player, tools, graph, files, stage, help: () => help(keys) });
+listen(keys);
 
 // From the server.
 
-link.addEventListener("status", ({ detail }) => { veil(detail.text); connected(true); });
-link.addEventListener("ready", ({ detail }) => ready(detail.scene));
-link.addEventListener("lost", ({ detail }) => {
+const opened = storage.open().then(() => autosave.last());
+link.addEventListener("status", (/** @type {any} */ { detail }) => { veil(detail.text); connected(true); });
+link.addEventListener("ready", (/** @type {any} */ { detail }) => ready(detail.scene));
+link.addEventListener("lost", (/** @type {any} */ { detail }) => {
   connected(false);
   const reason = detail.reason ? ` (${detail.reason})` : "";
   $("banner").textContent = `The connection is lost${reason}. Your edits are kept; connecting again …`;
+  showReport();
 });
-link.addEventListener("error", ({ detail }) => say(detail.text, true));
+link.addEventListener("error", (/** @type {any} */ { detail }) => say(detail.text, true));
 
+/** @param {boolean} there */
 function connected(there) {
   $("banner").hidden = there;
   $("dot").className = there ? "dot ok" : "dot";
   $("dot").setAttribute("aria-label", there ? "connected" : "not connected");
 }
 
-function ready(description) {
+/** @param {any} description */
+async function ready(description) {
   connected(true);
-  scene = description;
   veil("");
-  $("export").querySelector("[value=mp4]").disabled = !scene.film;
-  $("export").querySelector("[value=mp4]").title = scene.film ? "" : "needs pip install 'getup-jax[video]'";
-  try {
-    view ??= new View($("view"), scene);
-    strip ??= new Strip($("strip"), scene, view.software);
-  } catch {
-    veil("This browser has no WebGL: curves, scores and exports work, the 3-D view does not.");
-  }
+  const last = store.project ?? (await opened);
+  scene = description;
+  if (!stage.begin(scene)) veil("This browser has no WebGL: curves, scores and exports work, the 3-D view does not.");
   controls.fill(scene);
-  simulations.begin(scene);
-  store.begin(scene.curves[0]);
+  tools.fillPoses(scene);
+  results.begin(scene);
+  if (store.project) return store.tell("show");
+  autosave.open(last ?? project(scene.curves[0], "My get-up"), !last);
+  if (!storage.lasting) say("This browser keeps nothing: export the project before you close the page.", true);
 }
 
-simulations.addEventListener("asked", ({ detail: { slot, request } }) => {
-  strip?.cancel(); // of a motion that is no longer asked for
-  if (request.released === null || slot !== store.active) return;
+results.addEventListener("asked", (/** @type {any} */ { detail: { request } }) => {
+  stage.strip?.cancel(); // of a motion that is no longer asked for
+  showReport();
+  if (request.released === null || request.slot !== store.active) return;
   latency.begin(request);
   report.measuring();
   player.restart();
 });
-simulations.addEventListener("frames", ({ detail: { slot, motion, request, first } }) => {
+results.addEventListener("frames", (/** @type {any} */ { detail: { result, first } }) => {
   due.curves = true;
-  if (slot !== store.active || !first) return;
-  face(motion);
-  latency.came(request, "first");
-  if (latency.waits) whenFree(showFrame); // at once: a person waits for it
+  if (result.slot !== store.active || !first) return;
+  showReport();
+  stage.face(result);
+  latency.came(result, "first");
+  if (latency.waits) stage.whenFree(showFrame); // at once: a person waits for it
 });
-simulations.addEventListener("result", ({ detail: { slot, motion, request } }) => {
+results.addEventListener("result", (/** @type {any} */ { detail: { result } }) => {
   due.curves = true;
-  document.body.dataset.shown = request.number;
-  if (slot !== store.active) return;
+  document.body.dataset.shown = result.number;
+  if (result.slot !== store.active) return;
   due.strip = true;
-  report.show(motion, scene.match_deg);
-  latency.came(request, "whole");
+  showReport();
+  latency.came(result, "whole");
 });
-
-// The ground of a new place, and the camera at the side of a new start.
-function face(motion) {
-  if (!view) return;
-  if (JSON.stringify(view.ground ?? null) !== JSON.stringify(motion.ground)) view.setGround(motion.ground);
-  const { curve, region, place } = store.current;
-  const start = JSON.stringify([curve.start, curve.pose, region, place]);
-  if (start === faced) return;
-  faced = start;
-  view.face(motion.pose(0), scene.links.indexOf("neck"));
-}
 
 // From the user.
 
-store.addEventListener("change", ({ detail: { kind, at } }) => {
+store.addEventListener("change", (/** @type {any} */ { detail: { kind, at } }) => {
   if (!scene) return;
-  simulations.update(at); // first: the server works while the page draws
-  controls.show();
-  tabs.draw();
-  view?.arrange(store.variants.length, store.active);
-  if (kind === "show") report.show(simulations.motions[store.active], scene.match_deg);
+  if (kind === "project") begin();
+  results.update(at); // first: the server works while the page draws
+  sources.update();
+  show();
   due.curves = true;
-  due.strip ||= kind === "show"; // of an edit when its motion is there
+  due.strip ||= kind === "show" || kind === "project"; // of an edit when its motion is there
+  if (kind !== "live") autosave.save();
 });
 
-function taken(curves, name, imported) {
-  if (imported) controls.addImported(curves);
-  store.choose(curves[0]);
-  const [curve] = curves;
-  const more = curves.length > 1 ? `; ${curves.length - 1} more under Curve` : "";
-  const lengths = curve.durations.length > 1 ? ` (of its durations ${curve.durations.join(", ")} s the middle one)` : "";
-  say(`${name}: ${curve.name}${lengths}${more}`);
+/** Another project: nothing of the last one stays. */
+function begin() {
+  results.clear();
+  graph.picked = {};
+  player.setRange(null);
+  graph.zoom(null);
 }
 
-document.addEventListener("keydown", (event) => {
-  const key = event.key.toLowerCase();
-  if ((event.ctrlKey || event.metaKey) && "zys".includes(key)) {
-    event.preventDefault();
-    if (key === "s") files.save();
-    else if (key === "y" || event.shiftKey) store.redo();
-    else store.undo();
-  } else if (key === " " && !/^(button|input|select)$/i.test(event.target.tagName)) {
-    event.preventDefault();
-    player.toggle();
-  } else if ((key === "," || key === ".") && !/^input$/i.test(event.target.tagName)) {
-    player.seek(player.time + (key === "." ? 1 : -1) * (scene?.control_dt ?? 0));
-  }
+/** Everything but what animation frames draw. */
+function show() {
+  controls.show();
+  tabs.draw();
+  tools.show();
+  stage.arrange();
+  $("project").textContent = store.project?.name ?? "Project";
+  $("apart-label").hidden = store.variants.length < 2;
+  showReport();
+}
+
+function showReport() {
+  if (scene && store.project) report.show(results.active, results.current(store.active), link.open, scene.match_deg, wishes);
+}
+
+/** What came of the poses that were wished. */
+function wishes() {
+  const motion = results.active?.motion, of = { seconds: duration(store.now), dt: scene.control_dt };
+  return motion ? store.now.wishes.map((wish) => wishWords(wish.name, reached(scene, motion, wish, of))) : [];
+}
+
+/** @param {import("./types.js").Curve[]} curves @param {string} file */
+function taken(curves, file) {
+  const [curve] = curves;
+  store.commit((now) => choose(now, curve));
+  const more = curves.length > 1 ? `; ${curves.length - 1} more under Curve` : "";
+  const lengths = curve.durations.length > 1 ? ` (of its durations ${curve.durations.join(", ")} s the middle one)` : "";
+  say(`${file}: ${curve.name}${lengths}, ${alike(curve, scene.curves)}${more}`);
+}
+
+for (const id of ["source", "follow", "apart", "standard"]) $(id).addEventListener("change", () => {
+  stage.settings();
+  sources.update();
+  due.curves = true;
 });
-$("follow").addEventListener("change", () => { if (view) view.follow = $("follow").checked; });
+sources.addEventListener("change", () => { due.curves = true; });
 addEventListener("resize", () => { due.strip = true; });
 watchTheme($("theme"), () => {
-  view?.theme();
-  strip?.theme();
+  stage.theme();
   due.strip = true;
 });
+$("help").addEventListener("click", () => help(keys));
+firstVisit();
+
+/** Three lines, once. */
+function firstVisit() {
+  const key = "getup-edit-visited";
+  try { $("hint").hidden = localStorage.getItem(key) !== null; } catch { return; }
+  $("hint-close").addEventListener("click", () => {
+    $("hint").hidden = true;
+    localStorage.setItem(key, "1");
+  });
+}
 
 // To the screen, in every animation frame.
 
 function showFrame() {
-  if (!scene) return;
-  if (due.curves) panels.draw();
-  else if (player.moved) panels.drawTime();
+  if (!scene || !store.project) return;
+  if (due.curves) graph.draw();
+  else if (player.moved) graph.drawTime();
   due.curves = false;
-  const pictured = view ? showMotions() : true;
-  if (latency.waits && pictured) latency.drawn(view?.fence);
-  const shown = simulations.motions[store.active];
-  if (due.strip && strip && shown?.result) {
-    due.strip = false;
-    strip.draw(shown, view.orbit.azimuth, () => !view.fence.waiting);
-  }
+  const pictured = stage.draw(latency.waits);
+  if (latency.waits && pictured) latency.drawn(stage.fence);
+  if (due.strip && stage.drawStrip()) due.strip = false;
 }
 
-// After the picture at hand, since another one would queue up behind it.
-function whenFree(call) {
-  if (view) view.fence.then(call);
-  else call();
-}
-
-// The variants' poses at the player's time; returns whether the view shows them now.
-function showMotions() {
-  const { motions } = simulations;
-  const frame = (motion) => player.frame(motion, scene.control_dt);
-  store.variants.forEach((_, slot) => {
-    const motion = motions[slot];
-    if (motion?.count) view.pose(slot, motion, frame(motion));
-    else view.pose(slot, null, 0);
-  });
-  const active = motions[store.active];
-  if (view.follow && active?.count) view.centre(active.pose(frame(active)), 0.12);
-  return view.draw(latency.waits);
-}
-
+/** @param {string} text */
 function veil(text) {
   $("veil").textContent = text;
   $("veil").hidden = !text;
-}
-
-function say(text, bad = false) {
-  const toast = $("toast");
-  toast.textContent = text;
-  toast.className = bad ? "shown bad" : "shown";
-  clearTimeout(say.timer);
-  say.timer = setTimeout(() => { toast.className = ""; }, bad ? 9000 : 4000);
 }

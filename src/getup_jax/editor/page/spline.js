@@ -2,8 +2,10 @@
 // B-spline, phantom end points 2 p0 - p1, so that a curve starts and ends at its first and last point.
 
 export const POINTS = 9;
+/** @type {import("./types.js").Feature[]} */
 export const FEATURES = ["height", "side_angle", "front_angle"];
 
+/** What each control point counts for at a phase. @param {number} s */
 export function weights(s) {
   const u = Math.min(Math.max(s, 0), 1) * (POINTS - 1);
   const w = Array.from({ length: POINTS + 2 }, (_, i) => bump(u - (i - 1)));
@@ -15,25 +17,17 @@ export function weights(s) {
   return inner;
 }
 
+/** @param {number} x */
 function bump(x) {
   const a = Math.abs(x);
   if (a < 1) return 2 / 3 - a * a + (a * a * a) / 2;
   return a < 2 ? (2 - a) ** 3 / 6 : 0;
 }
 
-const TABLE = Array.from({ length: 129 }, (_, i) => weights(i / 128));
+// Weights of the control points at 129 equal steps of the phase.
+export const TABLE = Array.from({ length: 129 }, (_, i) => weights(i / 128));
 
-// The curve at 129 equal steps of the phase.
+/** The curve at 129 equal steps of the phase. @param {number[]} points */
 export function sample(points) {
   return TABLE.map((w) => w.reduce((sum, weight, i) => sum + weight * points[i], 0));
-}
-
-// Points moved in time with both ends in place: amount > 0 rises later, < 0 earlier.
-export function shifted(points, amount) {
-  const last = POINTS - 1;
-  return points.map((_, i) => {
-    const u = (i / last) ** (2 ** amount) * last;
-    const low = Math.min(Math.floor(u), last - 1);
-    return points[low] + (u - low) * (points[low + 1] - points[low]);
-  });
 }

@@ -1,115 +1,131 @@
-// What the user edits: up to four variants, each a curve and where it starts; undo and redo.
-// It lives in the page and in the tab's session storage, so that no server can lose it.
+// What the user edits: a project with up to four variants. Everything that is shown follows from it and
+// from the results; nothing else keeps a state of its own.
+//
+// Event "change" { kind, at }: "live" while a gesture goes on, "commit" at its end (at: when), "show" for
+// another variant, "project" for another project.
 
-import { FEATURES, POINTS } from "./spline.js";
+import { duration } from "./content.js";
+import * as history from "./history.js";
+import { SLOTS } from "./project.js";
 
-export const MOST_VARIANTS = 4;
-const KEY = "getup-edit";
-const MOST_STEPS = 200;
+/** @import { Content, Imported, Project, Variant } from "./types.js" */
 
 export class Store extends EventTarget {
   constructor() {
     super();
-    this.variants = [];
-    this.active = 0;
-    this.past = [];
-    this.future = [];
-    this.restore();
+    /** @type {Project | null} */
+    this.project = null;
+    /** @type {Content | null} */
+    this.draft = null; // of the active variant, while a gesture goes on
   }
 
-  get current() { return this.variants[this.active]; }
-  get curve() { return this.current.curve; }
+  /** @returns {Variant[]} */
+  get variants() { return this.project?.variants ?? []; }
+  get active() { return this.project?.active ?? 0; }
+  get current() { return /** @type {Variant} */ (this.variants.find((v) => v.slot === this.active)); }
+  get now() { return this.draft ?? this.current.history.now; }
 
-  // Variants of the first visit.
-  begin(curve) {
-    if (!this.variants.length) this.variants = [variantOf(curve)];
-    this.stamp = this.snapshot();
-    this.changed("show");
+  /** What a variant is now. @param {Variant} variant */
+  contentOf(variant) { return variant.slot === this.active ? this.now : variant.history.now; }
+
+  /** The longest duration of all variants (s). */
+  get longest() { return Math.max(0, ...this.variants.map((variant) => duration(this.contentOf(variant)))); }
+
+  /** @param {Project} project */
+  open(project) {
+    this.project = project;
+    this.draft = null;
+    this.tell("project");
   }
 
-  // A change while a gesture goes on: shown and simulated, not yet a step to undo.
+  /** While a gesture goes on: from the content at its beginning, so that nothing adds up. @param {(now: Content) => Content} change */
   live(change) {
-    change(this.current);
-    this.changed("live");
+    this.draft = change(this.current.history.now);
+    this.tell("live");
   }
 
-  // The end of a gesture, or a change at once; at: when it ended.
-  commit(change = () => {}, at = performance.now()) {
-    change(this.current);
-    const now = this.snapshot();
-    if (now !== this.stamp) {
-      this.past.push(this.stamp);
-      if (this.past.length > MOST_STEPS) this.past.shift();
-      this.future = [];
-      this.stamp = now;
-    }
-    this.changed("commit", at);
+  /** The gesture never was. */
+  cancel() {
+    if (!this.draft) return false;
+    this.draft = null;
+    this.tell("commit", performance.now());
+    return true;
   }
 
-  undo() { this.step(this.past, this.future); }
-  redo() { this.step(this.future, this.past); }
-
-  step(from, to) {
-    if (!from.length) return;
-    to.push(this.stamp);
-    this.stamp = from.pop();
-    ({ variants: this.variants, active: this.active } = JSON.parse(this.stamp));
-    this.changed("commit", performance.now());
+  /** The end of a gesture, or a change at once. @param {((now: Content) => Content) | null} change @param {{ at?: number, tag?: string }} how */
+  commit(change = null, { at = performance.now(), tag = "" } = {}) {
+    const now = change ? change(this.now) : this.now;
+    this.draft = null;
+    this.write(history.record(this.current.history, now, tag, at));
+    this.tell("commit", at);
   }
 
-  // Replaces the curve of the active variant; reset goes back to it.
-  choose(curve) {
-    this.commit((variant) => {
-      variant.curve = plain(curve);
-      variant.reference = plain(curve);
-    });
+  undo() { this.step(history.undo); }
+  redo() { this.step(history.redo); }
+
+  /** @param {typeof history.undo} to */
+  step(to) {
+    if (this.cancel()) return;
+    this.write(to(this.current.history));
+    this.tell("commit", performance.now());
   }
 
+  /** @param {import("./types.js").History} written */
+  write(written) {
+    const { slot } = this.current;
+    this.change({ variants: this.variants.map((v) => (v.slot === slot ? { slot, history: written } : v)) });
+  }
+
+  /** @param {Partial<Project>} changed */
+  change(changed) { this.project = { .../** @type {Project} */ (this.project), ...changed }; }
+
+  /** A copy of the active variant, in the first free slot. */
   addVariant() {
-    if (this.variants.length >= MOST_VARIANTS) return;
-    this.variants.push(structuredClone(this.current));
-    this.active = this.variants.length - 1;
+    const slot = [0, 1, 2, 3].find((i) => !this.variants.some((v) => v.slot === i));
+    if (slot === undefined) return;
     this.commit();
+    const copy = { slot, history: history.begin(this.now) };
+    this.change({ variants: [...this.variants, copy].sort((a, b) => a.slot - b.slot), active: slot });
+    this.tell("commit", performance.now());
   }
 
-  removeVariant(index) {
-    if (this.variants.length < 2) return;
-    this.variants.splice(index, 1);
-    this.active = Math.min(this.active, this.variants.length - 1);
-    this.commit();
-    this.changed("show"); // the motion of the one that is now active may be there already
+  /** Gives the variant that was removed, for those who want it back. */
+  removeActive() {
+    if (this.variants.length < 2) return null;
+    this.draft = null;
+    const removed = this.current, variants = this.variants.filter((v) => v !== removed);
+    this.change({ variants, active: variants[0].slot });
+    this.tell("show");
+    return removed;
   }
 
-  show(index) {
-    this.active = index;
-    this.stamp = this.snapshot();
-    this.changed("show");
+  /** @param {Variant} variant */
+  putBack(variant) {
+    if (this.variants.length >= SLOTS || this.variants.some((v) => v.slot === variant.slot)) return;
+    this.change({ variants: [...this.variants, variant].sort((a, b) => a.slot - b.slot), active: variant.slot });
+    this.tell("show");
   }
 
-  snapshot() { return JSON.stringify({ variants: this.variants, active: this.active }); }
-
-  // at: when a gesture ended; null while it goes on, and where nothing was edited.
-  changed(kind, at = null) {
-    this.dispatchEvent(new CustomEvent("change", { detail: { kind, at } }));
-    if (kind !== "live") sessionStorage.setItem(KEY, this.snapshot());
+  /** @param {number} slot */
+  show(slot) {
+    if (slot === this.active) return;
+    this.commit(); // a gesture that goes on ends with the variant that it was made on
+    this.change({ active: slot });
+    this.tell("show");
   }
 
-  restore() {
-    try {
-      const kept = JSON.parse(sessionStorage.getItem(KEY));
-      const whole = kept.variants.every((v) => FEATURES.every((f) => v.curve[f].length === POINTS));
-      if (whole && kept.variants.length) ({ variants: this.variants, active: this.active } = kept);
-    } catch { /* nothing was kept */ }
+  /** @param {string} name */
+  rename(name) {
+    this.change({ name });
+    this.tell("show");
   }
-}
 
-function variantOf(curve) {
-  return { curve: plain(curve), reference: plain(curve), region: 0, place: 0 };
-}
+  /** @param {Imported[]} imported */
+  addImported(imported) {
+    this.change({ imported: [.../** @type {Project} */ (this.project).imported, ...imported] });
+    this.tell("show");
+  }
 
-// A curve of its own with one duration, the middle one of a file's.
-function plain(curve) {
-  const copy = structuredClone(curve);
-  copy.durations = [copy.durations[Math.floor((copy.durations.length - 1) / 2)]];
-  return copy;
+  /** @param {string} kind @param {number | null} at */
+  tell(kind, at = null) { this.dispatchEvent(new CustomEvent("change", { detail: { kind, at } })); }
 }

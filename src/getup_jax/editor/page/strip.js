@@ -4,7 +4,7 @@
 import { Color, DirectionalLight, Group, HemisphereLight, OrthographicCamera, Scene, WebGLRenderer } from "./vendor/three.min.js";
 import { Body } from "./body.js";
 import { Fence } from "./gpu.js";
-import { heightAt } from "./ground.js";
+import { heightAt } from "./height.js";
 
 const POSES = 7;
 const SPACING_M = 1.8;
@@ -34,6 +34,7 @@ export class Strip {
     this.place = new Group();
     this.place.add(this.body.group);
     this.scene.add(this.place);
+    this.across = 1;
     this.work = 0; // the drawing at hand; an older one stops
     this.theme();
   }
@@ -57,15 +58,25 @@ export class Strip {
         if (pose === 0) this.begin(width, height);
         this.add(motion, azimuth, pose++);
         this.fence.set();
+        this.fence.then(() => { if (work === this.work) this.show(); }); // as they come
       }
       if (pose < POSES) whenIdle(step, { timeout: PATIENCE_MS });
-      else this.fence.then(() => { if (work === this.work) this.show(); });
+      else this.fence.then(() => { if (work === this.work) this.finish(); });
     };
     whenIdle(step, { timeout: PATIENCE_MS });
   }
 
   // A drawing that is under way is of something that is no longer asked for.
-  cancel() { this.work += 1; }
+  cancel() {
+    this.work += 1;
+    this.canvas.classList.add("stale");
+  }
+
+  // Of a motion that there is not.
+  clear() {
+    this.cancel();
+    this.canvas.getContext("2d")?.clearRect(0, 0, this.canvas.width, this.canvas.height);
+  }
 
   begin(width, height) {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
@@ -94,6 +105,8 @@ export class Strip {
     this.canvas.width = drawn.width;
     this.canvas.height = drawn.height;
     this.canvas.getContext("2d").drawImage(drawn, 0, 0);
-    this.canvas.dataset.drawn = this.work;
+    this.canvas.classList.remove("stale");
   }
+
+  finish() { this.canvas.dataset.drawn = String(this.work); }
 }

@@ -1,49 +1,46 @@
 // The variants as tabs, with a button for a further one and one to remove the active one.
 
-import { MOST_VARIANTS } from "./store.js";
+import { el } from "./dom.js";
+import { say } from "./notice.js";
+import { SLOTS } from "./project.js";
+
+const LETTERS = "ABCD";
 
 export class Tabs {
-  // onRemove(slot): before the store forgets it
-  constructor(root, store, onRemove) { Object.assign(this, { root, store, onRemove }); }
-
-  // Only what changed is made anew: curves are edited far more often than variants.
-  draw() {
-    const { root, store } = this;
-    const shown = `${store.active} of ${store.variants.length}`;
-    if (shown === this.shown) return;
-    this.shown = shown;
-    const buttons = store.variants.map((_, slot) => this.tab(slot));
-    const add = button("+ variant", "A copy to compare with: the others stay as ghosts", () => store.addVariant());
-    add.disabled = store.variants.length >= MOST_VARIANTS;
-    buttons.push(add);
-    if (store.variants.length > 1) {
-      const remove = button("×", "Remove this variant", () => {
-        this.onRemove(store.active);
-        store.removeVariant(store.active);
-      });
-      remove.setAttribute("aria-label", "Remove this variant");
-      buttons.push(remove);
-    }
-    const focused = [...root.children].indexOf(document.activeElement);
-    root.replaceChildren(...buttons);
-    if (focused >= 0) root.children[Math.min(focused, buttons.length - 1)].focus();
+  /** @param {HTMLElement} root @param {import("./store.js").Store} store */
+  constructor(root, store) {
+    this.root = root;
+    this.store = store;
+    this.shown = "";
   }
 
+  /** Only what changed is made anew: curves are edited far more often than variants. */
+  draw() {
+    const { root, store } = this;
+    const shown = `${store.active} of ${store.variants.map((v) => v.slot)}`;
+    if (shown === this.shown) return;
+    this.shown = shown;
+    const buttons = store.variants.map(({ slot }) => this.tab(slot));
+    const full = store.variants.length >= SLOTS;
+    buttons.push(el("button", { title: "A copy to compare with: the others stay as ghosts", disabled: full, onclick: () => store.addVariant() }, "+ variant"));
+    if (store.variants.length > 1) {
+      const words = "Remove this variant";
+      buttons.push(el("button", { title: words, "aria-label": words, onclick: () => this.remove() }, "×"));
+    }
+    const focused = [...root.children].indexOf(/** @type {Element} */ (document.activeElement));
+    root.replaceChildren(...buttons);
+    if (focused >= 0) /** @type {HTMLElement} */ (root.children[Math.min(focused, buttons.length - 1)]).focus();
+  }
+
+  remove() {
+    const removed = this.store.removeActive();
+    if (removed) say(`Variant ${LETTERS[removed.slot]} is removed.`, false, { words: "Put it back", act: () => this.store.putBack(removed) });
+  }
+
+  /** @param {number} slot */
   tab(slot) {
     const active = slot === this.store.active;
     const title = active ? "The variant that you edit" : "Edit this variant; it is the ghost in the view";
-    const made = button("ABCD"[slot], title, () => this.store.show(slot));
-    made.className = `swatch${slot}`;
-    made.setAttribute("role", "tab");
-    made.setAttribute("aria-selected", active);
-    return made;
+    return el("button", { title, class: `swatch${slot}`, role: "tab", "aria-selected": active ? "true" : "false", onclick: () => this.store.show(slot) }, LETTERS[slot]);
   }
-}
-
-function button(text, title, press) {
-  const made = document.createElement("button");
-  made.textContent = text;
-  made.title = title;
-  made.addEventListener("click", press);
-  return made;
 }

@@ -3,23 +3,34 @@
 import {
   Color, DirectionalLight, Fog, HemisphereLight, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer,
 } from "./vendor/three.min.js";
-import { Body } from "./body.js";
+import { Body, SOURCE } from "./body.js";
+import { cameraAt, pinch } from "./camera.js";
 import { drawsInSoftware, Fence } from "./gpu.js";
-import { heightAt, makeGround } from "./ground.js";
+import { makeGround } from "./ground.js";
+import { heightAt } from "./height.js";
 
 const LOOK_AT_M = 0.6; // above the ground
 const FOG_M = [9, 26]; // from the camera
 const FOG_PATCH_M = [4.5, 10.5]; // a piece of irregular ground fades before its edge
 const STILL_M = 0.002; // the camera does not follow less than this
+const APART_M = 1.3; // from variant to variant, where they are side by side
+const STILL = [1920, 1080]; // pixels of a picture that is exported
 const SLOW_MS = 50; // a picture; they are drawn more plainly when slower than this
 
+/** Directions to look from, in the order of their keys. @type {Record<string, string>} */
+export const STANDARD = { own: "Start (0)", front: "Front (1)", side: "Side (3)", top: "Top (7)" };
+
+/** @typedef {import("./motion.js").Motion} Motion */
+
 export class View {
+  /** @param {HTMLCanvasElement} canvas @param {any} scene */
   constructor(canvas, scene) {
     this.canvas = canvas;
     this.spec = scene;
     this.software = drawsInSoftware();
     this.plain = this.software;
     this.mean = 0;
+    this.colours = { sky: "", floor: "", line: "" };
     this.renderer = new WebGLRenderer({ canvas, antialias: !this.software });
     this.fence = new Fence(this.renderer.getContext());
     this.renderer.shadowMap.enabled = true;
@@ -30,7 +41,14 @@ export class View {
     this.orbit = { azimuth: 0.6, elevation: 0.28, distance: 4.2 };
     this.target = new Vector3(0, 0, LOOK_AT_M);
     this.follow = true;
-    this.bodies = [];
+    this.home = this.orbit.azimuth;
+    this.apart = false;
+    /** @type {Map<number, Body>} by slot */
+    this.bodies = new Map();
+    this.source = new Body(scene.shapes, scene.links.length);
+    this.source.dress(true, SOURCE);
+    this.source.group.visible = false;
+    this.scene.add(this.source.group);
     this.light();
     this.theme();
     this.listen();
@@ -70,31 +88,49 @@ export class View {
     this.dirty = true;
   }
 
-  // One body a variant; the active one is solid, the others are ghosts.
-  arrange(count, active) {
-    if (this.arranged === `${active} of ${count}`) return;
-    this.arranged = `${active} of ${count}`;
-    while (this.bodies.length < count) {
+  /** One body a variant; the active one is solid, the others are ghosts. @param {number[]} slots @param {number} active */
+  arrange(slots, active) {
+    const arranged = `${active} of ${slots}, ${this.apart}`;
+    if (this.arranged === arranged) return;
+    this.arranged = arranged;
+    for (const slot of slots) {
+      if (this.bodies.has(slot)) continue;
       const body = new Body(this.spec.shapes, this.spec.links.length);
       body.group.visible = false;
-      body.shown = null;
-      this.bodies.push(body);
+      this.bodies.set(slot, body);
       this.scene.add(body.group);
     }
-    this.bodies.forEach((body, slot) => {
-      if (slot >= count) Object.assign(body, { shown: null }).group.visible = false;
+    for (const [slot, body] of this.bodies) {
+      if (!slots.includes(slot)) this.hide(body);
       body.dress(slot !== active, slot);
-    });
+      const aside = this.apart ? (slots.indexOf(slot) - slots.indexOf(active)) * APART_M : 0;
+      body.group.position.set(-aside * Math.sin(this.home), aside * Math.cos(this.home), 0);
+    }
     this.dirty = true;
   }
 
-  // A frame of a variant's motion; null hides the variant.
+  /** @param {Body} body */
+  hide(body) {
+    body.shown = null;
+    body.group.visible = false;
+    this.dirty = true;
+  }
+
+  /** A frame of a variant's motion; null hides the variant. @param {number} slot @param {Motion | null | undefined} motion @param {number} frame */
   pose(slot, motion, frame) {
-    const body = this.bodies[slot], shown = motion && `${motion.number} ${frame}`;
-    if (body.shown === shown) return;
-    body.shown = shown;
-    body.group.visible = motion !== null;
-    if (motion) body.pose(motion.pose(frame));
+    const body = this.bodies.get(slot);
+    if (body) this.put(body, motion ? `${motion.number} ${frame}` : null, () => /** @type {Motion} */ (motion).pose(frame));
+  }
+
+  /** A pose of the clip behind the curve; null hides it. @param {string | null} key @param {() => Float32Array} values */
+  poseSource(key, values) { this.put(this.source, key, values); }
+
+  /** @param {Body} body @param {string | null} key @param {() => Float32Array} values */
+  put(body, key, values) {
+    if (body.shown === key) return;
+    body.shown = key;
+    body.group.visible = key !== null;
+    if (key !== null) body.pose(values());
     this.dirty = true;
   }
 
@@ -102,7 +138,17 @@ export class View {
   face(values, neck) {
     const dx = values[7 * neck] - values[0], dy = values[7 * neck + 1] - values[1];
     if (Math.hypot(dx, dy) > 0.1) this.orbit.azimuth = Math.atan2(dy, dx) - 0.42 * Math.PI;
+    this.home = this.orbit.azimuth;
     this.centre(values, 1);
+  }
+
+  /** From one of the standard directions; front: that in which the last pose looks. @param {string} from @param {number} heading rad */
+  look(from, heading) {
+    if (from === "front") Object.assign(this.orbit, { azimuth: heading, elevation: 0.08 });
+    else if (from === "side") Object.assign(this.orbit, { azimuth: heading - Math.PI / 2, elevation: 0.08 });
+    else if (from === "top") Object.assign(this.orbit, { elevation: 1.5 });
+    else Object.assign(this.orbit, { azimuth: this.home, elevation: 0.28, distance: 4.2 });
+    this.dirty = true;
   }
 
   centre(values, share) {
@@ -121,19 +167,36 @@ export class View {
     const rest = this.software && !now ? this.fence.took : 0;
     if (this.fence.waiting || performance.now() < this.fence.free + rest) return false;
     this.dirty = false;
-    const { azimuth, elevation, distance } = this.orbit;
-    const flat = distance * Math.cos(elevation);
-    this.camera.position.set(
-      this.target.x + flat * Math.cos(azimuth), this.target.y + flat * Math.sin(azimuth),
-      this.target.z + distance * Math.sin(elevation),
-    );
-    this.camera.lookAt(this.target);
+    this.stand();
     this.sun.position.copy(this.target).add(new Vector3(1.6, -1.2, 4.5));
     this.sun.target.position.copy(this.target);
     this.renderer.render(this.scene, this.camera);
     this.fence.set();
     this.fence.then(() => this.pace(this.fence.took));
     return true;
+  }
+
+  /** Puts the camera into its place, above whatever the ground is there. */
+  stand() {
+    const { camera, target, ground } = this;
+    camera.position.set(...cameraAt(target, this.orbit, ground));
+    camera.lookAt(target);
+  }
+
+  /** The picture at hand, larger. @returns {Promise<Blob | null>} */
+  still() {
+    const { renderer, camera, canvas } = this, [width, height] = STILL;
+    renderer.setPixelRatio(1);
+    renderer.setSize(width, height, false);
+    camera.aspect = width / height;
+    camera.updateProjectionMatrix();
+    this.stand();
+    renderer.render(this.scene, camera);
+    return new Promise((resolve) => canvas.toBlob((blob) => {
+      this.resize();
+      this.dirty = true;
+      resolve(blob);
+    }));
   }
 
   // Without shadows and sharp edges where they cost too much.
@@ -164,20 +227,30 @@ export class View {
 
   listen() {
     const { canvas } = this;
+    /** @type {Map<number, PointerEvent>} */
+    const fingers = new Map();
     canvas.addEventListener("pointermove", (event) => {
-      if (event.buttons & 1) this.turn(-0.008 * event.movementX, 0.008 * event.movementY);
+      const before = fingers.get(event.pointerId);
+      if (!before) return;
+      const [one, two] = [...fingers.values()];
+      if (two) this.turn(0, 0, pinch(one, two, before, event));
+      else this.turn(-0.008 * (event.clientX - before.clientX), 0.008 * (event.clientY - before.clientY));
+      fingers.set(event.pointerId, event);
     });
-    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      if (event.button === 0) fingers.set(event.pointerId, event);
+    });
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => fingers.delete(/** @type {PointerEvent} */ (event).pointerId));
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
       this.turn(0, 0, Math.exp(0.0012 * event.deltaY));
     }, { passive: false });
     canvas.addEventListener("keydown", (event) => {
       const turns = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.08], ArrowDown: [0, -0.08], "+": [0, 0, 0.9], "-": [0, 0, 1.1] };
-      if (event.key in turns) {
-        event.preventDefault();
-        this.turn(...turns[event.key]);
-      }
+      if (!(event.key in turns) || event.ctrlKey || event.metaKey) return;
+      event.preventDefault();
+      this.turn(...turns[event.key]);
     });
   }
 }

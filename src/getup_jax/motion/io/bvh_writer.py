@@ -57,11 +57,28 @@ def _joint_lines(
 def _rows(file: Recording, moving: list[bool], order: list[int]) -> list[str]:
     turns = Rotation.from_quat(file.rotations.reshape(-1, 4), scalar_first=True)
     angles = turns.as_euler("ZYX", degrees=True).reshape(*file.rotations.shape[:2], 3)
+    angles = continuous_angles(angles)
     columns = []
     for joint in order:
         columns += [file.translations[:, joint]] if moving[joint] else []
         columns.append(angles[:, joint])
     return [_numbers(row) for row in np.concatenate(columns, axis=1)]
+
+
+def continuous_angles(angles: np.ndarray) -> np.ndarray:
+    """Euler angles [F, N, 3] (degrees, Z Y X) of the same rotations without jumps.
+
+    Each rotation has two sets of angles, (z, y, x) and (z + 180, 180 - y, x + 180), and whole turns
+    of each; the ones nearest to the frame before are taken.
+    """
+    found = angles.copy()
+    for frame in range(1, len(found)):
+        before, here = found[frame - 1], angles[frame]
+        other = here * [1.0, -1.0, 1.0] + 180.0
+        first, second = (near - 360.0 * np.round((near - before) / 360.0) for near in (here, other))
+        farther = np.abs(first - before).sum(axis=1) > np.abs(second - before).sum(axis=1)
+        found[frame] = np.where(farther[:, None], second, first)
+    return found
 
 
 def _numbers(values: np.ndarray) -> str:

@@ -1,0 +1,63 @@
+// A variant's content: how it begins, what the policy sees of it, and what is asked for it.
+
+import { clamp, kept, KINDS } from "./features.js";
+import { drawn, fit, keysOf } from "./keys.js";
+import { FEATURES, sample } from "./spline.js";
+
+/** @import { Content, Curve, Feature, Key } from "./types.js" */
+
+export const DURATION_S = [0.5, 20];
+const POINT_LIMITS = { height: [-0.5, 2.5], side_angle: [-90, 270], front_angle: [-90, 270] }; // of curve files
+const MOST_LETTERS = 80;
+
+/** @param {Curve} curve @returns {Content} */
+export function contentOf(curve) {
+  const own = plain(curve);
+  return { curve: own, keys: {}, reference: own, region: 0, place: 0, wishes: [] };
+}
+
+/** A curve of its own with one duration, the middle one of a file's. @param {Curve} curve @returns {Curve} */
+export function plain(curve) {
+  const copy = structuredClone(curve);
+  copy.durations = [copy.durations[Math.floor((copy.durations.length - 1) / 2)]];
+  return copy;
+}
+
+/** The keys of a feature: the ones that were drawn, or those of its control points. @param {Content} now @param {Feature} feature @returns {Key[]} */
+export function keysIn(now, feature) { return now.keys[feature] ?? keysOf(now.curve[feature]); }
+
+/** The same content with other keys, and the control points that are nearest to them. @param {Content} now @param {Partial<Record<Feature, Key[]>>} changed @returns {Content} */
+export function withKeys(now, changed) {
+  const keys = { ...now.keys }, curve = { ...now.curve };
+  for (const feature of FEATURES) {
+    const drawnKeys = changed[feature];
+    if (!drawnKeys) continue;
+    keys[feature] = drawnKeys.map((key) => ({ ...key, value: kept(feature, key.value) }));
+    const [low, high] = POINT_LIMITS[feature];
+    curve[feature] = fit(keys[feature]).map((v) => clamp(Number(v.toFixed(KINDS[feature].digits + 1)), low, high));
+  }
+  return { ...now, keys, curve };
+}
+
+/** How far the curve that the policy sees is from the drawn one at most. @param {Content} now @param {Feature} feature */
+export function misfit(now, feature) {
+  const keys = now.keys[feature];
+  if (!keys) return 0;
+  const seen = sample(now.curve[feature]);
+  return Math.max(...drawn(keys).map((value, i) => Math.abs(value - seen[i])));
+}
+
+/** @param {Content} now */
+export function duration(now) { return now.curve.durations[0]; }
+
+/** A duration as it is stored; the shortest for what is no number. @param {number} seconds */
+export function keptDuration(seconds) { return clamp(Number(seconds.toFixed(2)) || DURATION_S[0], DURATION_S[0], DURATION_S[1]); }
+
+/** What a name may not have is left out. @param {string} text */
+export function keptName(text) { return text.normalize("NFC").replace(/[^\p{L}\p{N}_.@:~ -]/gu, "").slice(0, MOST_LETTERS); }
+
+/** What the server needs for a motion: names change none. @param {Content} now */
+export function asked(now) {
+  const { curve: { name, strategy, ...curve }, region, place } = now;
+  return { curve, region, place };
+}

@@ -1,0 +1,53 @@
+// What of time and value a panel shows, and where on the screen.
+
+import { clamp } from "./features.js";
+
+export const LEFT = 40, RIGHT = 12, TOP = 22, BOTTOM = 20;
+const LEAST_S = 0.2; // the shortest time that can be zoomed into
+const STEPS = [0.1, 0.2, 0.5, 1, 2, 5];
+
+/** @typedef {[number, number]} Range */
+
+export class Scale {
+  /** @param {number} width @param {number} height px @param {Range} times s @param {Range} values */
+  constructor(width, height, times, values) {
+    this.width = width;
+    this.height = height;
+    this.times = times;
+    this.values = values;
+  }
+
+  get across() { return Math.max(this.width - LEFT - RIGHT, 1); }
+  get down() { return Math.max(this.height - TOP - BOTTOM, 1); }
+  /** @param {number} time s */
+  x(time) { return LEFT + ((time - this.times[0]) / (this.times[1] - this.times[0])) * this.across; }
+  /** @param {number} value */
+  y(value) { return TOP + ((this.values[1] - value) / (this.values[1] - this.values[0])) * this.down; }
+  /** @param {number} x px */
+  time(x) { return this.times[0] + ((x - LEFT) / this.across) * (this.times[1] - this.times[0]); }
+  /** @param {number} y px */
+  value(y) { return this.values[1] - ((y - TOP) / this.down) * (this.values[1] - this.values[0]); }
+}
+
+/** A range that is `factor` times as long, with `about` in its place. @param {Range} range @param {number} about @param {number} factor @returns {Range} */
+export function zoomed([low, high], about, factor) { return [about + (low - about) * factor, about + (high - about) * factor]; }
+
+/** A range of times inside of the whole motion. @param {Range} range @param {number} span s @returns {Range} */
+export function within([low, high], span) {
+  const length = clamp(high - low, Math.min(LEAST_S, span), span), start = clamp(low, 0, span - length);
+  return [start, start + length];
+}
+
+/** Times (s) of the lines of a grid, about `most` of them, at whole frames where frames are counted. @param {Range} range @param {number} most */
+export function timeTicks([low, high], most) {
+  const step = STEPS.find((s) => (high - low) / s <= most) ?? 10;
+  const ticks = [];
+  for (let i = Math.ceil(low / step - 1e-6); i * step <= high + 1e-6; i++) ticks.push(Number((i * step).toFixed(3)));
+  return ticks;
+}
+
+/** @param {number} time s @param {boolean} frames @param {number} fps */
+export function timeLabel(time, frames, fps) { return frames ? String(Math.round(time * fps)) : String(time); }
+
+/** To the nearest whole number of steps. @param {number} value @param {number} step */
+export function snapped(value, step) { return Math.round(value / step) * step; }

@@ -1,0 +1,84 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { curve } from "./samples.js";
+import { Autosave } from "../../../src/getup_jax/editor/page/autosave.js";
+import { last } from "../../../src/getup_jax/editor/page/edits.js";
+import { copyOf, project } from "../../../src/getup_jax/editor/page/project.js";
+import { Store } from "../../../src/getup_jax/editor/page/store.js";
+
+/** A browser's storage of tabs that share it. */
+class Shared {
+  constructor() {
+    this.lasting = true;
+    this.projects = new Map();
+    this.writes = 0;
+  }
+
+  async write(one) {
+    this.writes += 1;
+    await null;
+    const there = this.projects.get(one.id), next = { ...one, revision: one.revision + 1, saved: 1 };
+    const written = there && there.revision !== one.revision ? { ...copyOf(next, `${one.name} (copy)`), revision: 1 } : next;
+    this.projects.set(written.id, written);
+    return written;
+  }
+}
+
+globalThis.addEventListener ??= () => {};
+globalThis.document ??= /** @type {any} */ ({ body: { dataset: {} } });
+
+function tab(storage) {
+  const store = new Store(), said = [], autosave = new Autosave(storage, store, (text) => said.push(text));
+  store.addEventListener("change", ({ detail }) => { if (detail.kind !== "live") autosave.save(); });
+  return { store, autosave, said };
+}
+const seconds = (one) => one.variants[0].history.now.curve.durations[0];
+
+test("every finished edit is stored, also one that is made while another is being stored", async () => {
+  const storage = new Shared(), { store, autosave } = tab(storage);
+  await autosave.open(project(curve(), "p"), true);
+  store.commit((now) => last(now, 5));
+  store.commit((now) => last(now, 6));
+  await autosave.save();
+  const [stored] = storage.projects.values();
+  assert.equal(seconds(stored), 6);
+  assert.equal(stored.revision, store.project.revision);
+});
+
+test("to open a project, and to look at a variant anew, stores nothing", async () => {
+  const storage = new Shared(), { store, autosave } = tab(storage);
+  await autosave.open(project(curve(), "p"), false);
+  store.tell("show");
+  await autosave.save();
+  assert.equal(storage.writes, 0);
+});
+
+test("two tabs of one project become two projects, each with its own edits", async () => {
+  const storage = new Shared(), one = tab(storage), two = tab(storage);
+  await one.autosave.open(project(curve(), "p"), true);
+  await two.autosave.open([...storage.projects.values()][0], false);
+  one.store.commit((now) => last(now, 5));
+  await one.autosave.save();
+  two.store.commit((now) => last(now, 9));
+  await two.autosave.save();
+  assert.deepEqual([...storage.projects.values()].map(seconds), [5, 9]);
+  assert.equal(two.store.project.name, "p (copy)");
+  assert.equal(two.said.length, 1);
+  one.store.commit((now) => last(now, 6));
+  await one.autosave.save();
+  assert.deepEqual([...storage.projects.values()].map(seconds), [6, 9]);
+});
+
+test("what the browser does not store is said, and tried again with the next edit", async () => {
+  const storage = new Shared(), { store, autosave, said } = tab(storage);
+  const { write } = storage;
+  storage.write = () => Promise.reject(new Error("full"));
+  await autosave.open(project(curve(), "p"), true);
+  assert.match(said[0], /did not store the project \(full\); export it/);
+  assert.ok(autosave.failed);
+  storage.write = write;
+  store.commit((now) => last(now, 5));
+  await autosave.save();
+  assert.ok(!autosave.failed);
+});

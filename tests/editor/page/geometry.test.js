@@ -1,0 +1,64 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { close } from "./samples.js";
+import { cameraAt } from "../../../src/getup_jax/editor/page/camera.js";
+import { contacts, reached } from "../../../src/getup_jax/editor/page/contacts.js";
+import { Scale, snapped, timeTicks, within, zoomed } from "../../../src/getup_jax/editor/page/graph_scale.js";
+import { lostRuns } from "../../../src/getup_jax/editor/page/panel_motion.js";
+
+test("a scale turns places into times and values, and back", () => {
+  const scale = new Scale(500, 200, [1, 4], [-0.2, 1.8]);
+  for (const [time, value] of [[1, 0], [2.5, 1], [4, 1.8]]) close([scale.time(scale.x(time)), scale.value(scale.y(value))], [time, value]);
+});
+
+test("zooming keeps what is under the pointer and stays inside the motion", () => {
+  const [low, high] = zoomed([0, 4], 1, 0.5);
+  assert.deepEqual([low, high], [0.5, 2.5]);
+  assert.deepEqual(within([-3, -1], 6), [0, 2]);
+  assert.deepEqual(within([5, 9], 6), [2, 6]);
+  assert.deepEqual(within([0, 99], 6), [0, 6]);
+  const [a, b] = within([1, 1.001], 6);
+  assert.ok(b - a > 0.19);
+});
+
+test("ticks are few and at round times", () => {
+  assert.deepEqual(timeTicks([0, 6], 8), [0, 1, 2, 3, 4, 5, 6]);
+  assert.deepEqual(timeTicks([1.1, 1.5], 5), [1.1, 1.2, 1.3, 1.4, 1.5]);
+  for (const span of [0.3, 1, 7, 23]) assert.ok(timeTicks([0, span], 10).length <= 12);
+  assert.ok(Math.abs(snapped(0.1234, 0.01) - 0.12) < 1e-12);
+});
+
+test("the camera stays above the ground, flat or not, wherever it is turned", () => {
+  const hill = { origin: [-5, -5], step: 1, points: 11, heights: Array.from({ length: 121 }, (_, i) => (i % 11 > 7 ? 3 : 0)) };
+  for (let azimuth = 0; azimuth < 6.3; azimuth += 0.3) {
+    for (const elevation of [-0.05, 0.3, 1.2]) {
+      const orbit = { azimuth, elevation, distance: 4.2 }, [x, , z] = cameraAt({ x: 0, y: 0, z: 0.6 }, orbit, hill);
+      assert.ok(z >= (Math.round(x + 5) > 7 ? 3 : 0) + 0.2);
+      assert.ok(cameraAt({ x: 0, y: 0, z: 0.6 }, orbit, null)[2] >= 0.2);
+    }
+  }
+});
+
+test("contacts are the links on the ground, turned as they are and on hills", () => {
+  const capsule = { link: 0, kind: "capsule", size: [0.05, 0.2], position: [0, 0, 0], quaternion: [1, 0, 0, 0] };
+  const scene = { shapes: [capsule], links: ["foot_l"] }, upright = [0, 0, 0.25, 1, 0, 0, 0], lying = [0, 0, 0.25, Math.SQRT1_2, Math.SQRT1_2, 0, 0];
+  const touching = (pose, ground = null) => contacts(scene, Float32Array.from(pose), ground);
+  assert.deepEqual(touching(upright), ["left foot"]);
+  assert.deepEqual(touching(lying), []);
+  assert.deepEqual(touching(lying, { origin: [-1, -1], step: 1, points: 3, heights: Array(9).fill(0.2) }), ["left foot"]);
+});
+
+test("of a wished pose one sees which contacts were there for half of the time", () => {
+  const shape = (link) => ({ link, kind: "sphere", size: [0.05], position: [0, 0, 0], quaternion: [1, 0, 0, 0] });
+  const scene = { shapes: [shape(0), shape(1)], links: ["hand_l", "hand_r"] };
+  const heights = [[0.05, 0.5], [0.05, 0.5], [0.05, 0.05], [0.5, 0.5]];
+  const motion = { count: 4, ground: null, pose: (i) => Float32Array.from(heights[i].flatMap((z) => [0, 0, z, 1, 0, 0, 0])) };
+  const wish = { name: "", from: 0.25, to: 1, contacts: ["left hand", "right hand"] };
+  assert.deepEqual(reached(scene, motion, wish, { seconds: 4, dt: 1 }), { reached: ["left hand"], missed: ["right hand"], others: [] });
+  assert.deepEqual(reached(scene, motion, { ...wish, contacts: [] }, { seconds: 4, dt: 1 }).others, ["left hand"]);
+});
+
+test("where physics does not follow is said in runs of frames", () => {
+  assert.deepEqual(lostRuns([0, 0.2, -0.3, 0.1, 0.16], 0.15), [[1, 2], [4, 4]]);
+});

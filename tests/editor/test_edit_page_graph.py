@@ -1,0 +1,133 @@
+"""Curves as in a graph editor, with the mouse alone, in headless Chromium."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from browser import BROWSER, FRONT, HEIGHT, drag, drawn, edited, judged, opened, saved, shot, value
+
+from getup_jax.motion.io.curve_file import read_curve_file
+
+pytestmark = BROWSER
+
+
+def box(page, panel: str = HEIGHT) -> dict[str, float]:
+    return page.locator(f'[aria-label="{panel}"]').bounding_box()
+
+
+def count(page, panel: str = HEIGHT) -> int:
+    drawn(page)
+    return page.locator(f'[aria-label="{panel}"] .point').count()
+
+
+def seek(page, seconds: float) -> None:
+    """Click on the axis below the last panel."""
+    frame = box(page, FRONT)
+    span = float(page.input_value("#seconds")) + 3
+    across = frame["width"] - 52
+    page.mouse.click(frame["x"] + 40 + across * seconds / span, frame["y"] + frame["height"] - 8)
+
+
+def test_points_are_added_selected_scaled_copied_and_deleted(page_server):
+    with opened(page_server[0]) as page:
+        frame = box(page)
+        edited(page, lambda: page.mouse.dblclick(frame["x"] + 130, frame["y"] + 40))
+        assert count(page) == 10
+        page.keyboard.press("Delete")
+        assert count(page) == 9
+        page.mouse.move(frame["x"] + 110, frame["y"] + 24)
+        page.mouse.down()
+        page.mouse.move(frame["x"] + 300, frame["y"] + frame["height"] - 25, steps=4)
+        page.mouse.up()
+        picked = page.locator(f'[aria-label="{HEIGHT}"] .point.picked').count()
+        assert picked >= 3
+        before = value(page, HEIGHT, 4)
+        handle = page.locator(f'[aria-label="{HEIGHT}"] .handle.top').bounding_box()
+        page.mouse.move(handle["x"] + 4, handle["y"] + 4)
+        page.mouse.down()
+        page.mouse.move(handle["x"] + 4, handle["y"] + 34, steps=3)
+        edited(page, page.mouse.up)
+        assert value(page, HEIGHT, 4) < before
+        page.click("#key-copy")
+        seek(page, 0.3)
+        edited(page, lambda: page.click("#key-paste"))
+        page.click("#pass-linear")
+        shot(page, "graph")
+        assert page.locator('.point[data-kind="linear"]').count() >= 3
+
+
+def test_time_and_value_are_typed_and_read(page_server):
+    with opened(page_server[0]) as page:
+        page.locator(f'[aria-label="{HEIGHT}"] [data-point="4"]').click()
+        typed = float(page.input_value("#key-value"))
+        assert typed == pytest.approx(value(page, HEIGHT, 4), abs=1e-3)
+        page.fill("#key-value", "0.8")
+        edited(page, lambda: page.press("#key-value", "Enter"))
+        assert value(page, HEIGHT, 4) == 0.8
+        page.fill("#key-time", "1.8")
+        edited(page, lambda: page.press("#key-time", "Enter"))
+        label = page.locator(f'[aria-label="{HEIGHT}"] [data-point="4"]').get_attribute(
+            "aria-label"
+        )
+        assert "1.80 s" in label
+        page.check("#frames")
+        assert page.input_value("#key-time") == "54"
+
+
+def test_slower_by_mouse_alone(page_server, tmp_path):
+    with opened(page_server[0], accept_downloads=True) as page:
+        before = float(re.search(r"[\d.]+", page.inner_text("#verdict"))[0])
+        page.click("#pass-auto")
+        edited(page, lambda: page.click("#stretch"))
+        judged(page)
+        assert float(page.input_value("#seconds")) == pytest.approx(5.1, abs=0.2)
+        after = float(re.search(r"[\d.]+", page.inner_text("#verdict"))[0])
+        assert after > before + 0.5
+
+
+def test_a_pause_on_hands_and_knees_by_mouse_alone(page_server, tmp_path):
+    with opened(page_server[0], accept_downloads=True) as page:
+        page.click("#play")
+        seek(page, 1.2)
+        page.fill("#hold-seconds", "2")
+        edited(page, lambda: page.click("#hold"))
+        seek(page, 1.3)
+        page.click("#in")
+        seek(page, 3.1)
+        page.click("#out")
+        edited(page, lambda: page.select_option("#pose", label="hands and knees"))
+        judged(page)
+        seek(page, 2.5)
+        drawn(page)
+        shot(page, "pause")
+        scores = page.inner_text("#scores")
+        assert "“hands and knees”" in scores, "it is not said what came of the wish"
+        assert "left hand, right hand" in scores, scores
+        assert "hand" in page.inner_text("#contacts")
+        rows = saved(page, "csv", tmp_path).read_text().splitlines()
+        heights = [
+            float(row.split(",")[5]) for row in rows[1:] if 1.8 < float(row.split(",")[0]) < 3
+        ]
+        assert max(heights) - min(heights) < 0.15, "it does not pause"
+
+
+def test_another_style_by_mouse_alone(page_server):
+    with opened(page_server[0]) as page:
+        edited(page, lambda: page.select_option("#curve", label="supine_situp_squat"))
+        judged(page)
+        assert page.inner_text("#verdict").startswith("Stands")
+        assert page.input_value("#start") == "supine_situp_squat"
+
+
+def test_from_this_capture_but_lower_by_mouse_alone(page_server, tmp_path):
+    with opened(page_server[0], accept_downloads=True) as page:
+        file = saved(page, "npz", tmp_path)
+        edited(page, lambda: page.set_input_files("#file-motion", str(file)))
+        before = value(page, HEIGHT, 5)
+        edited(page, lambda: drag(page, HEIGHT, 5, -25))
+        assert value(page, HEIGHT, 5) < before - 0.1
+        page.check("#source")
+        page.wait_for_selector(".recorded")
+        shot(page, "lower")
+        assert read_curve_file(saved(page, "#save", tmp_path)).pose is not None
