@@ -65,6 +65,37 @@ def eval_parser() -> argparse.ArgumentParser:
     return parser
 
 
+_BENCH_EXAMPLES = """\
+examples:
+  getup-bench flat --quick                 a minute, to see that a policy runs
+  getup-bench runs/mine --json mine.json   the whole benchmark
+  getup-bench mine.onnx                    a policy of getup-export, or one graph; docs/bench.md
+  getup-bench my_policies:Crawl            a function or class in my_policies.py
+"""
+
+
+def bench_parser() -> argparse.ArgumentParser:
+    """The parser of `getup-bench`."""
+    parser = argparse.ArgumentParser(
+        prog="getup-bench",
+        description="Let a policy get up from fixed starts, on fixed grounds, with pushes; success "
+        "is told by our rule, by those of the papers that it is after, and by HoST's.",
+        epilog=_BENCH_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add(
+        "policy",
+        metavar="POLICY",
+        help="a shipped policy's name, a run folder, a checkpoint, hf://OWNER/NAME, an .onnx "
+        "file, or MODULE:FUNCTION",
+    )
+    add("--quick", action="store_true", help="one round of one suite")
+    add("--json", type=output(".json"), metavar="FILE", help="the results; a .json file")
+    add("--engine", metavar="E", help="native, mjx or mjx-warp (default: as for training)")
+    return parser
+
+
 def add_checkpoint(parser: argparse.ArgumentParser) -> None:
     """The argument --ckpt."""
     parser.add_argument(
