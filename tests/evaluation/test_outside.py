@@ -119,9 +119,9 @@ def test_each_batch_has_a_new_policy_that_is_told_by_name_and_obeyed(outside_tas
     np.testing.assert_allclose(second["qpos"], trace.qpos[0], atol=1e-6)
     # of a push it knows a step later, as a policy of ours does
     push = int(trace.pushed.argmax(axis=0)[0])
-    before, now, after = (policy.states[push + i]["qvel"][:, :3] for i in (-1, 0, 1))
-    assert np.linalg.norm(now - before, axis=-1).max() < 0.1
-    assert np.linalg.norm(after - now, axis=-1).min() > 0.2
+    before, now, after = (policy.states[push + i]["qvel"] for i in (-1, 0, 1))
+    changes = [np.linalg.norm(x, axis=-1) for x in (now - before, after - now)]
+    assert (changes[1] > 3.0 * changes[0]).all(), changes
 
 
 STATE = {"target": np.zeros((2, 3), np.float32)}
