@@ -13,6 +13,7 @@ from getup_jax.evaluation import driver, film, plot, steering
 from getup_jax.evaluation.scenario import Scenario
 from getup_jax.evaluation.steering_script import read_script
 from getup_jax.motion.io.glb_writer import require_glb
+from getup_jax.motion.io.usd_writer import require_usd
 from getup_jax.runtime import checkpoint
 from getup_jax.runtime.checkpoint import LoadedPolicy
 from getup_jax.runtime.console import Display
@@ -27,6 +28,8 @@ def evaluate_command(args: argparse.Namespace) -> int:
         plot.require()
     if args.glb is not None:
         require_glb()
+    if args.usd is not None:
+        require_usd()
     loaded, scenario = checkpoint.load_policy(args.ckpt), to_scenario(args)
     if args.script is not None:
         return _steer(args, loaded, scenario)
@@ -43,9 +46,10 @@ def evaluate_command(args: argparse.Namespace) -> int:
     if args.video is not None:
         found.film(args.video)
         print(f"video: {args.video}")
-    if args.glb is not None:
-        found.glb(args.glb)
-        print(f"glb: {args.glb}")
+    for kind, path in (("glb", args.glb), ("usd", args.usd)):
+        if path is not None:
+            found.takes(path)
+            print(f"{kind}: {path}")
     return 0
 
 
@@ -56,8 +60,9 @@ def _steer(args: argparse.Namespace, loaded: LoadedPolicy, scenario: Scenario) -
     scenario.check_composite()
     if args.plot is not None:
         raise ConfigError("--plot: not with --script; run getup-eval once more without it")
-    if args.glb is not None:
-        raise ConfigError("--glb: not with --script; run getup-eval once more without it")
+    for option in ("glb", "usd"):
+        if getattr(args, option) is not None:
+            raise ConfigError(f"--{option}: not with --script; run getup-eval once more without it")
     course, task = steering.steer(loaded, scenario, read_script(args.script))
     print(steering.table(course))
     _write(args.json, steering.to_json(course))

@@ -19,8 +19,10 @@ from getup_jax.evaluation import film
 from getup_jax.motion.getup.curves import NAMES
 from getup_jax.motion.io.bvh_writer import write_bvh
 from getup_jax.motion.io.curve_file import dump
-from getup_jax.motion.io.glb_writer import Take, glb_bytes
+from getup_jax.motion.io.glb_writer import glb_bytes
 from getup_jax.motion.io.recording import Recording
+from getup_jax.motion.io.takes import Take
+from getup_jax.motion.io.usd_writer import write_usd
 from getup_jax.motion.retarget.retarget import RetargetReport
 from getup_jax.motion.retarget.subprocess_job import Stop
 from getup_jax.physics.character import CharacterSpec
@@ -30,9 +32,9 @@ _SOURCE = "getup-edit"
 
 
 def export(motion: Motion, character: CharacterSpec, kind: str, stop: Stop | None = None) -> bytes:
-    """The content of a file of one of the FORMATS, or of `glb`; a film ends early once stopped."""
+    """The content of a file: one of the FORMATS, `glb` or `usd`; a film ends once stopped."""
+    take = Take(motion.curve.name, 1.0 / motion.control_dt, motion.frames.qpos)
     if kind == "glb":
-        take = Take(motion.curve.name, 1.0 / motion.control_dt, motion.frames.qpos)
         return glb_bytes(character, [take])
     if kind == "csv":
         return to_csv(motion, character).encode()
@@ -42,6 +44,8 @@ def export(motion: Motion, character: CharacterSpec, kind: str, stop: Stop | Non
         path = Path(folder) / f"motion.{kind}"
         if kind == "bvh":
             write_bvh(recording(motion, character), path)
+        elif kind == "usd":
+            write_usd(path, character, [take])
         else:
             _film(motion, character, path, stop or Stop())
         return path.read_bytes()

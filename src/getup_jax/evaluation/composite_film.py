@@ -13,7 +13,8 @@ from getup_jax.envs.composite.goals import Marker
 from getup_jax.envs.composite.task import CompositeTask
 from getup_jax.evaluation import film as video
 from getup_jax.evaluation.composite_rollout import FILMED, CompositeEpisodes
-from getup_jax.motion.io.glb_writer import Take, write_glb
+from getup_jax.motion.io import takes as files
+from getup_jax.motion.io.takes import Take
 
 
 def film(path: Path, built: BuiltComposite, episodes: CompositeEpisodes) -> None:
@@ -29,13 +30,13 @@ def film(path: Path, built: BuiltComposite, episodes: CompositeEpisodes) -> None
 
 
 def write_takes(path: Path, env: CompositeTask, episodes: CompositeEpisodes) -> None:
-    """The same episodes as animations of a GLB file; goals and balls are not in it."""
+    """The same episodes as animations of a GLB or USD file; goals and balls are not in it."""
     rate = 1.0 / env.engine.control_dt
     takes = [
         Take(f"episode {number}", rate, qpos)
         for number, qpos in enumerate(episodes.qpos[:FILMED], 1)
     ]
-    write_glb(path, env.character, takes)
+    files.write_takes(path, env.character, takes)
 
 
 def markers(

@@ -27,7 +27,7 @@ class Evaluation:
     facts: dict[str, Any]  # for JSON: scores, policy, conditions
     film: Callable[[Path], None]  # writes an .mp4
     plot: Callable[[Path], None]  # writes a picture
-    glb: Callable[[Path], None]  # writes animations
+    takes: Callable[[Path], None]  # writes animations, a .glb or USD file
 
 
 def episode_count(loaded: LoadedPolicy, scenario: Scenario, plotted: bool = False) -> int:
@@ -62,7 +62,7 @@ def evaluate(loaded: LoadedPolicy, scenario: Scenario, display: Display) -> Eval
         facts={**to_json(scores), **facts},
         film=lambda path: films.film(path, episodes),
         plot=lambda path: plot.plot(path, episodes),
-        glb=lambda path: films.write_takes(path, episodes),
+        takes=lambda path: films.write_takes(path, episodes),
     )
 
 
@@ -75,5 +75,5 @@ def _of_composite(loaded: LoadedPolicy, scenario: Scenario, display: Display) ->
         facts={**composite.to_json(scores), **composite.description(loaded, scenario, built)},
         film=lambda path: composite_film.film(path, built, episodes),
         plot=lambda path: meta_weights_plot.plot_weights(path, character, episodes),
-        glb=lambda path: composite_film.write_takes(path, built.environment, episodes),
+        takes=lambda path: composite_film.write_takes(path, built.environment, episodes),
     )

@@ -19,7 +19,8 @@ from getup_jax.envs.composite.goals import Marker
 from getup_jax.envs.composite.goals.drawing import add_markers
 from getup_jax.evaluation.metrics import episode_values
 from getup_jax.evaluation.rollout import Episodes
-from getup_jax.motion.io.glb_writer import Take, write_glb
+from getup_jax.motion.io import takes as files
+from getup_jax.motion.io.takes import Take
 from getup_jax.runtime.console import Display
 
 STYLES = 8  # filmed at most
@@ -52,7 +53,7 @@ def film(path: Path, result: Episodes) -> None:
 
 
 def write_takes(path: Path, result: Episodes) -> None:
-    """The same episodes as animations of a GLB file."""
+    """The same episodes as animations of a GLB or USD file."""
     env = result.task.environment
     takes = [
         Take(
@@ -62,7 +63,7 @@ def write_takes(path: Path, result: Episodes) -> None:
         )
         for episode in typical(result, STYLES)
     ]
-    write_glb(path, env.character, takes)
+    files.write_takes(path, env.character, takes)
 
 
 def typical(result: Episodes, most: int) -> list[int]:

@@ -186,6 +186,12 @@ def _add_outputs(group: argparse._ArgumentGroup) -> None:
         help="the same episodes as animations of a mesh, for Blender and browsers; a .glb file",
     )
     add(
+        "--usd",
+        type=output(".usd", ".usda", ".usdc"),
+        metavar="FILE",
+        help="the same as USD, one after the other on its time line; .usd, .usda or .usdc",
+    )
+    add(
         "--plot",
         type=output(".png", ".pdf", ".svg"),
         metavar="FILE",
