@@ -158,6 +158,7 @@ def test_eval_passes_its_arguments_on(monkeypatch):
             "curves",
         ]
     )
+    default |= {"size": (720, 1280)}
     default |= {"terrain_seed": None, "motions": None, "script": None, "drops": None}
     assert vars(seen[0]) == default
     assert vars(seen[1]) == default | {

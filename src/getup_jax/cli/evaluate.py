@@ -24,6 +24,8 @@ def evaluate_command(args: argparse.Namespace) -> int:
     begin = time.monotonic()
     if args.video is not None:
         film.require()
+    if args.turntable is not None:
+        film.require("--turntable")
     if args.plot is not None:
         plot.require()
     if args.glb is not None:
@@ -44,8 +46,11 @@ def evaluate_command(args: argparse.Namespace) -> int:
         found.plot(args.plot)
         print(f"plot: {args.plot}")
     if args.video is not None:
-        found.film(args.video)
+        found.film(args.video, args.size)
         print(f"video: {args.video}")
+    if args.turntable is not None:
+        found.turntable(args.turntable)
+        print(f"turntable: {args.turntable}")
     for kind, path in (("glb", args.glb), ("usd", args.usd)):
         if path is not None:
             found.takes(path)
@@ -60,14 +65,14 @@ def _steer(args: argparse.Namespace, loaded: LoadedPolicy, scenario: Scenario) -
     scenario.check_composite()
     if args.plot is not None:
         raise ConfigError("--plot: not with --script; run getup-eval once more without it")
-    for option in ("glb", "usd"):
+    for option in ("glb", "usd", "turntable"):
         if getattr(args, option) is not None:
             raise ConfigError(f"--{option}: not with --script; run getup-eval once more without it")
     course, task = steering.steer(loaded, scenario, read_script(args.script))
     print(steering.table(course))
     _write(args.json, steering.to_json(course))
     if args.video is not None:
-        steering.film(args.video, task, course)
+        steering.film(args.video, task, course, args.size)
         print(f"video: {args.video}")
     return 0
 

@@ -94,7 +94,7 @@ def _train(args: argparse.Namespace) -> int:
 
 
 def _evaluate(args: argparse.Namespace) -> int:
-    if args.video is not None or args.plot is not None:
+    if any(x is not None for x in (args.video, args.plot, args.turntable)):
         _render_without_display()
     from getup_jax.cli.evaluate import evaluate_command
 

@@ -180,6 +180,19 @@ def _add_outputs(group: argparse._ArgumentGroup) -> None:
         help="a typical episode of several styles; an .mp4 file",
     )
     add(
+        "--size",
+        type=_size,
+        default=(720, 1280),
+        metavar="WxH",
+        help="of the film in pixels, even numbers (default: 1280x720)",
+    )
+    add(
+        "--turntable",
+        type=output(".png", ".jpg"),
+        metavar="FILE",
+        help="a typical episode at four moments from six sides; a .png or .jpg file",
+    )
+    add(
         "--glb",
         type=output(".glb"),
         metavar="FILE",
@@ -241,6 +254,17 @@ def low_high(text: str) -> tuple[float, float]:
     if low > high:
         raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
     return low, high
+
+
+def _size(text: str) -> tuple[int, int]:
+    """Rows and columns of WIDTHxHEIGHT; film formats want even numbers."""
+    width, _, height = text.partition("x")
+    found = [int(x) if x.isascii() and x.isdigit() else 0 for x in (height, width)]
+    if not all(16 <= x <= 4096 and x % 2 == 0 for x in found):
+        raise argparse.ArgumentTypeError(
+            f"expected WIDTHxHEIGHT in even numbers from 16 to 4096, such as 1280x720, got {text!r}"
+        )
+    return found[0], found[1]
 
 
 def _number(text: str, fits: Callable[[float], bool], expected: str) -> float:
