@@ -147,6 +147,7 @@ def test_eval_passes_its_arguments_on(monkeypatch):
         [
             "json",
             "video",
+            "turntable",
             "glb",
             "usd",
             "plot",
