@@ -7,6 +7,7 @@ of a suite that changes makes another `VERSION`.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,8 +15,8 @@ import numpy as np
 
 from getup_jax.config import Config, ConfigError, PhysicsConfig, TaskConfig
 from getup_jax.config.load import load_config
-from getup_jax.evaluation.getup import Entry, Rate, evaluation_config, run, scores_of
-from getup_jax.evaluation.metrics import wilson
+from getup_jax.evaluation.getup import Entry, Rate, evaluation_config, run
+from getup_jax.evaluation.metrics import episode_values, wilson
 from getup_jax.evaluation.outside import as_outside, is_outside, load_outside
 from getup_jax.evaluation.rollout import Episodes
 from getup_jax.evaluation.scenario import Scenario
@@ -188,10 +189,12 @@ def cells_of(suite: str, episodes: Episodes, scenario: Scenario) -> Iterator[Cel
 
 
 def _motion(episodes: Episodes) -> dict[str, float]:
-    """How it moves, of what `getup-eval` says."""
-    scores = scores_of(episodes)
+    """How it moves: means over the episodes of what `getup-eval` says."""
+    env = episodes.task.environment
+    values = episode_values(episodes.trace, env.engine.control_dt, env.config.stand_time_s)
     kept = ("return_rate", "height_error_m", "angle_error_rad", "jitter", "energy_j", "torque_nm")
-    return {name: float(getattr(scores, name)) for name in kept}
+    known = {name: values[name][np.isfinite(values[name])] for name in kept}
+    return {name: float(x.mean()) if x.size else math.nan for name, x in known.items()}
 
 
 def _facts(entry: Entry) -> dict[str, Any]:
