@@ -144,8 +144,22 @@ def test_eval_passes_its_arguments_on(monkeypatch):
     default = {"ckpt": "flat", "episodes": None, "seed": 0, "start": "lying"}
     default |= {"start_noise": 0.0, "duration_scale": (1.0, 1.0)}
     default |= dict.fromkeys(
-        ["json", "video", "glb", "plot", "engine", "stand_time", "blend", "push", "edits", "curves"]
+        [
+            "json",
+            "video",
+            "turntable",
+            "glb",
+            "usd",
+            "plot",
+            "engine",
+            "stand_time",
+            "blend",
+            "push",
+            "edits",
+            "curves",
+        ]
     )
+    default |= {"size": (720, 1280)}
     default |= {"terrain_seed": None, "motions": None, "script": None, "drops": None}
     assert vars(seen[0]) == default
     assert vars(seen[1]) == default | {

@@ -82,9 +82,10 @@ def test_a_film_has_the_frames_at_the_rate_of_the_policy(episodes, monkeypatch, 
     writer = FakeWriter()
     monkeypatch.setattr(film, "require", lambda: writer)
     monkeypatch.setattr(
-        film, "render", lambda model, qpos: [np.zeros((48, 64, 3), np.uint8)] * len(qpos)
+        film, "render", lambda model, qpos, size: [np.zeros((*size, 3), np.uint8)] * len(qpos)
     )
-    film.film(tmp_path / "a.mp4", episodes)
+    film.film(tmp_path / "a.mp4", episodes, (48, 64))
+    assert {image.shape for image in writer.images} == {(48, 64, 3)}
     assert writer.settings["fps"] == 30
     chosen = film.typical(episodes, film.STYLES)
     steps = int(episodes.trace.running[:, chosen].sum())
@@ -113,10 +114,20 @@ def test_a_real_film(episodes, tmp_path):
     if not can_render(episodes):
         pytest.skip("this machine cannot render")
     file = tmp_path / "a.mp4"
-    film.film(file, episodes)
+    film.film(file, episodes, (240, 320))
     with imageio.get_reader(file) as reader:
         assert reader.get_meta_data()["fps"] == 30
-        assert reader.get_meta_data()["size"] == (640, 480)
+        assert reader.get_meta_data()["size"] == (320, 240)
+
+
+def test_a_picture_of_a_films_own_size(episodes):
+    """Larger than what MuJoCo renders unless it is told."""
+    if not can_render(episodes):
+        pytest.skip("this machine cannot render")
+    model = episodes.task.environment.character.model
+    (image,) = film.render(model, episodes.trace.qpos[:1, 0], film.FILM_SIZE)
+    assert image.shape == (720, 1280, 3)
+    assert image.std() > 5
 
 
 def test_without_imageio_the_error_says_what_to_install(monkeypatch):

@@ -64,3 +64,15 @@ def test_bad_values_are_refused(arguments, message, capsys):
         parse("=".join(arguments))
     assert caught.value.code == 2
     assert message in capsys.readouterr().err
+
+
+def test_the_size_of_a_film_is_width_times_height():
+    assert parse().size == (720, 1280)
+    assert parse("--size", "640x480").size == (480, 640)
+
+
+@pytest.mark.parametrize("text", ["640", "641x480", "0x480", "-640x480", "640x480x3", "9999x9998"])
+def test_a_size_that_no_film_has_is_refused(text, capsys):
+    with pytest.raises(SystemExit):
+        parse(f"--size={text}")
+    assert "expected WIDTHxHEIGHT in even numbers" in capsys.readouterr().err

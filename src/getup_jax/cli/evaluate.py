@@ -13,6 +13,7 @@ from getup_jax.evaluation import driver, film, plot, steering
 from getup_jax.evaluation.scenario import Scenario
 from getup_jax.evaluation.steering_script import read_script
 from getup_jax.motion.io.glb_writer import require_glb
+from getup_jax.motion.io.usd_writer import require_usd
 from getup_jax.runtime import checkpoint
 from getup_jax.runtime.checkpoint import LoadedPolicy
 from getup_jax.runtime.console import Display
@@ -23,10 +24,14 @@ def evaluate_command(args: argparse.Namespace) -> int:
     begin = time.monotonic()
     if args.video is not None:
         film.require()
+    if args.turntable is not None:
+        film.require("--turntable")
     if args.plot is not None:
         plot.require()
     if args.glb is not None:
         require_glb()
+    if args.usd is not None:
+        require_usd()
     loaded, scenario = checkpoint.load_policy(args.ckpt), to_scenario(args)
     if args.script is not None:
         return _steer(args, loaded, scenario)
@@ -41,11 +46,15 @@ def evaluate_command(args: argparse.Namespace) -> int:
         found.plot(args.plot)
         print(f"plot: {args.plot}")
     if args.video is not None:
-        found.film(args.video)
+        found.film(args.video, args.size)
         print(f"video: {args.video}")
-    if args.glb is not None:
-        found.glb(args.glb)
-        print(f"glb: {args.glb}")
+    if args.turntable is not None:
+        found.turntable(args.turntable)
+        print(f"turntable: {args.turntable}")
+    for kind, path in (("glb", args.glb), ("usd", args.usd)):
+        if path is not None:
+            found.takes(path)
+            print(f"{kind}: {path}")
     return 0
 
 
@@ -56,13 +65,14 @@ def _steer(args: argparse.Namespace, loaded: LoadedPolicy, scenario: Scenario) -
     scenario.check_composite()
     if args.plot is not None:
         raise ConfigError("--plot: not with --script; run getup-eval once more without it")
-    if args.glb is not None:
-        raise ConfigError("--glb: not with --script; run getup-eval once more without it")
+    for option in ("glb", "usd", "turntable"):
+        if getattr(args, option) is not None:
+            raise ConfigError(f"--{option}: not with --script; run getup-eval once more without it")
     course, task = steering.steer(loaded, scenario, read_script(args.script))
     print(steering.table(course))
     _write(args.json, steering.to_json(course))
     if args.video is not None:
-        steering.film(args.video, task, course)
+        steering.film(args.video, task, course, args.size)
         print(f"video: {args.video}")
     return 0
 

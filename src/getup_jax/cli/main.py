@@ -1,4 +1,4 @@
-"""The commands getup-train, getup-eval, getup-export, getup-motion, getup-edit and getup-search.
+"""The commands getup-train, -eval, -bench, -export, -motion, -edit and -search.
 
 What imports JAX is imported where it is used, after the arguments and the settings were
 checked, so that a typing mistake is answered at once.
@@ -17,7 +17,7 @@ from getup_jax import __version__
 from getup_jax.cli.process_options import add_options, group_of
 from getup_jax.config.load import find_config, load_config
 from getup_jax.editor.options import parse as parse_edit
-from getup_jax.evaluation.options import eval_parser
+from getup_jax.evaluation.options import bench_parser, eval_parser
 from getup_jax.runtime import run_folder
 
 _TRAIN_EXAMPLES = """\
@@ -44,6 +44,11 @@ def train_main(argv: Sequence[str] | None = None) -> int:
 def eval_main(argv: Sequence[str] | None = None) -> int:
     """`getup-eval`; returns the exit code."""
     return _guard(_evaluate, eval_parser().parse_args(argv))
+
+
+def bench_main(argv: Sequence[str] | None = None) -> int:
+    """`getup-bench`; returns the exit code."""
+    return _guard(_bench, bench_parser().parse_args(argv))
 
 
 def export_main(argv: Sequence[str] | None = None) -> int:
@@ -89,11 +94,17 @@ def _train(args: argparse.Namespace) -> int:
 
 
 def _evaluate(args: argparse.Namespace) -> int:
-    if args.video is not None or args.plot is not None:
+    if any(x is not None for x in (args.video, args.plot, args.turntable)):
         _render_without_display()
     from getup_jax.cli.evaluate import evaluate_command
 
     return evaluate_command(args) or 0
+
+
+def _bench(args: argparse.Namespace) -> int:
+    from getup_jax.cli.bench import bench_command
+
+    return bench_command(args)
 
 
 def _export(argv: Sequence[str] | None) -> int:

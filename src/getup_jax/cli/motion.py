@@ -17,8 +17,10 @@ from getup_jax.cli.motion_report import FileReport, event_table, file_table, get
 from getup_jax.config import MotionConfig, PhysicsConfig
 from getup_jax.evaluation.options import output
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.io.glb_writer import Take, require_glb, write_glb
+from getup_jax.motion.io.glb_writer import require_glb
 from getup_jax.motion.io.readers import ReadOptions, motion_files
+from getup_jax.motion.io.takes import Take, write_takes
+from getup_jax.motion.io.usd_writer import require_usd
 from getup_jax.motion.library import cpus, load_motions
 from getup_jax.motion.retarget.cache import Job, Result, read_npz, retarget_files, write_npz
 from getup_jax.motion.retarget.joint_names import read_map
@@ -70,10 +72,15 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument(
         "--strategies", action="store_true", help="only mean and deviation of each strategy"
     )
-    glb = _command(commands, "glb", _glb, "get-ups as animations of a mesh, for Blender")
-    glb.add_argument("sources", nargs="+", metavar="SOURCE", help=_SOURCE)
-    glb.add_argument("--out", type=output(".glb"), required=True, metavar="FILE", help="the file")
-    glb.add_argument("--curves", nargs="*", default=[], metavar="NAME", help="only these get-ups")
+    for name, text, suffixes in (
+        ("glb", "get-ups as animations of a mesh, for Blender", (".glb",)),
+        ("usd", "the same as USD, for Omniverse and Houdini", (".usd", ".usda", ".usdc")),
+    ):
+        scene = _command(commands, name, _scene, text)
+        scene.add_argument("sources", nargs="+", metavar="SOURCE", help=_SOURCE)
+        file = scene.add_argument("--out", type=output(*suffixes), required=True, metavar="FILE")
+        file.help = "the file"
+        scene.add_argument("--curves", nargs="*", default=[], metavar="NAME", help="only these")
     events = _command(commands, "events", _events, "the get-ups in one file")
     events.add_argument("paths", nargs=1, type=Path, metavar="FILE")
     _add_reading(events)
@@ -193,14 +200,15 @@ def _plot(args: argparse.Namespace, character: CharacterSpec) -> int:
     return 0
 
 
-def _glb(args: argparse.Namespace, character: CharacterSpec) -> int:
-    require_glb()
+def _scene(args: argparse.Namespace, character: CharacterSpec) -> int:
+    require = require_glb if args.out.suffix.lower() == ".glb" else require_usd
+    require()
     config = MotionConfig(source=tuple(args.sources), curves=tuple(args.curves))
     clips = [getup.clip for getup in load_motions(config, character).getups if getup.clip]
     takes = [Take(clip.name, clip.fps, clip.qpos) for clip in clips]
     if not takes:
         raise MotionError(f"{', '.join(args.sources)}: expected motions, found curves alone")
-    write_glb(args.out, character, takes)
+    write_takes(args.out, character, takes)
     Console().print(f"{args.out}: {len(takes)} motions", soft_wrap=True)
     return 0
 

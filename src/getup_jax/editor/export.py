@@ -1,4 +1,4 @@
-"""A simulated motion as a file: GLB, BVH, NumPy's npz, CSV or a film."""
+"""A simulated motion as a file: GLB, USD, BVH, NumPy's npz, CSV or a film."""
 
 from __future__ import annotations
 
@@ -21,12 +21,19 @@ from getup_jax.evaluation import film
 from getup_jax.motion.getup.curves import NAMES
 from getup_jax.motion.io.bvh_writer import write_bvh
 from getup_jax.motion.io.curve_file import dump
-from getup_jax.motion.io.glb_writer import Take, glb_bytes, require_glb
+from getup_jax.motion.io.glb_writer import glb_bytes, require_glb
+from getup_jax.motion.io.takes import Take
+from getup_jax.motion.io.usd_writer import require_usd, write_usd
 from getup_jax.motion.retarget.retarget import RetargetReport
 from getup_jax.motion.retarget.subprocess_job import Stop
 from getup_jax.physics.character import CharacterSpec
 
-FORMATS = ("glb", "bvh", "npz", "csv", "mp4")
+FORMATS = ("glb", "usd", "bvh", "npz", "csv", "mp4")
+_REQUIRED = (
+    ("mp4", film.require, "video"),
+    ("glb", require_glb, "glb"),
+    ("usd", require_usd, "usd"),
+)
 _SOURCE = "getup-edit"
 
 
@@ -53,6 +60,8 @@ def export(
         path = Path(folder) / f"motion.{kind}"
         if kind == "bvh":
             write_bvh(recording(motion.curve.name, *take(motion, cut), character), path)
+        elif kind == "usd":
+            write_usd(path, character, [Take(motion.curve.name, *take(motion, cut))])
         else:
             write_film(motion, character, path, cut, stop or Stop(), progress)
         return path.read_bytes()
@@ -61,7 +70,7 @@ def export(
 def missing_extras() -> dict[str, str]:
     """What to install for each format that cannot be written here."""
     found = {}
-    for kind, require, extra in (("mp4", film.require, "video"), ("glb", require_glb, "glb")):
+    for kind, require, extra in _REQUIRED:
         try:
             require()
         except ConfigError:

@@ -13,10 +13,16 @@ from getup_jax.envs.composite.goals import Marker
 from getup_jax.envs.composite.task import CompositeTask
 from getup_jax.evaluation import film as video
 from getup_jax.evaluation.composite_rollout import FILMED, CompositeEpisodes
-from getup_jax.motion.io.glb_writer import Take, write_glb
+from getup_jax.motion.io import takes as files
+from getup_jax.motion.io.takes import Take
 
 
-def film(path: Path, built: BuiltComposite, episodes: CompositeEpisodes) -> None:
+def film(
+    path: Path,
+    built: BuiltComposite,
+    episodes: CompositeEpisodes,
+    size: tuple[int, int] = video.FILM_SIZE,
+) -> None:
     """The first episodes one after the other; markers show what their goals ask for."""
     env = built.environment
     groups = env.config.groups.values()
@@ -25,17 +31,17 @@ def film(path: Path, built: BuiltComposite, episodes: CompositeEpisodes) -> None
     for episode, qpos in enumerate(episodes.qpos[:FILMED]):
         shown = markers(env, episodes, episode)
         scenes.append((qpos, shown, [f"{episode + 1}: {names}"] * len(qpos)))
-    write(path, env, scenes)
+    write(path, env, scenes, size)
 
 
 def write_takes(path: Path, env: CompositeTask, episodes: CompositeEpisodes) -> None:
-    """The same episodes as animations of a GLB file; goals and balls are not in it."""
+    """The same episodes as animations of a GLB or USD file; goals and balls are not in it."""
     rate = 1.0 / env.engine.control_dt
     takes = [
         Take(f"episode {number}", rate, qpos)
         for number, qpos in enumerate(episodes.qpos[:FILMED], 1)
     ]
-    write_glb(path, env.character, takes)
+    files.write_takes(path, env.character, takes)
 
 
 def markers(
@@ -52,6 +58,7 @@ def write(
     path: Path,
     env: CompositeTask,
     scenes: Iterable[tuple[np.ndarray, list[list[Marker]] | None, list[str]]],
+    size: tuple[int, int] = video.FILM_SIZE,
 ) -> None:
     """A film of scenes: poses [F, 7 + J], markers [F], and the line [F] at the top."""
     imageio = video.require()
@@ -61,6 +68,6 @@ def write(
         rate = round(1.0 / env.engine.control_dt)
         with imageio.get_writer(path, fps=rate, macro_block_size=8) as writer:
             for qpos, shown, lines in scenes:
-                images = video.pictures(env.character.model, qpos, markers=shown)
+                images = video.pictures(env.character.model, qpos, size, shown)
                 for image, line in zip(images, lines, strict=True):
                     writer.append_data(video.caption(image, line))

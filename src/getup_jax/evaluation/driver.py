@@ -14,6 +14,7 @@ from getup_jax.evaluation import table as tables
 from getup_jax.evaluation.composite import CompositeScores
 from getup_jax.evaluation.metrics import Scores, to_json
 from getup_jax.evaluation.scenario import Scenario
+from getup_jax.evaluation.turntable import write_turntable
 from getup_jax.runtime.checkpoint import LoadedPolicy
 from getup_jax.runtime.console import Display
 
@@ -25,9 +26,10 @@ class Evaluation:
     scores: Scores | CompositeScores
     table: str  # for people
     facts: dict[str, Any]  # for JSON: scores, policy, conditions
-    film: Callable[[Path], None]  # writes an .mp4
+    film: Callable[[Path, tuple[int, int]], None]  # writes an .mp4 of that size (rows, columns)
+    turntable: Callable[[Path], None]  # writes stills from all around
     plot: Callable[[Path], None]  # writes a picture
-    glb: Callable[[Path], None]  # writes animations
+    takes: Callable[[Path], None]  # writes animations, a .glb or USD file
 
 
 def episode_count(loaded: LoadedPolicy, scenario: Scenario, plotted: bool = False) -> int:
@@ -60,9 +62,12 @@ def evaluate(loaded: LoadedPolicy, scenario: Scenario, display: Display) -> Eval
         scores=scores,
         table=table,
         facts={**to_json(scores), **facts},
-        film=lambda path: films.film(path, episodes),
+        film=lambda path, size: films.film(path, episodes, size),
+        turntable=lambda path: write_turntable(
+            path, episodes.task.environment.character.model, films.most_typical(episodes)
+        ),
         plot=lambda path: plot.plot(path, episodes),
-        glb=lambda path: films.write_takes(path, episodes),
+        takes=lambda path: films.write_takes(path, episodes),
     )
 
 
@@ -73,7 +78,8 @@ def _of_composite(loaded: LoadedPolicy, scenario: Scenario, display: Display) ->
         scores=scores,
         table=composite.table(scores),
         facts={**composite.to_json(scores), **composite.description(loaded, scenario, built)},
-        film=lambda path: composite_film.film(path, built, episodes),
+        film=lambda path, size: composite_film.film(path, built, episodes, size),
+        turntable=lambda path: write_turntable(path, character.model, episodes.qpos[0]),
         plot=lambda path: meta_weights_plot.plot_weights(path, character, episodes),
-        glb=lambda path: composite_film.write_takes(path, built.environment, episodes),
+        takes=lambda path: composite_film.write_takes(path, built.environment, episodes),
     )

@@ -19,18 +19,20 @@ from getup_jax.envs.composite.goals import Marker
 from getup_jax.envs.composite.goals.drawing import add_markers
 from getup_jax.evaluation.metrics import episode_values
 from getup_jax.evaluation.rollout import Episodes
-from getup_jax.motion.io.glb_writer import Take, write_glb
+from getup_jax.motion.io import takes as files
+from getup_jax.motion.io.takes import Take
 from getup_jax.runtime.console import Display
 
 STYLES = 8  # filmed at most
-SIZE = (480, 640)  # rows, columns
+SIZE = (480, 640)  # rows, columns of a picture
+FILM_SIZE = (720, 1280)  # of a film's
 _VIEW_DEG = 120.0  # from the body's axis to the direction that the camera looks in
 _failures: list[str] = []  # why this process cannot render
 _SHADOW = 1024  # pixels; without a GPU, shadows are most of the rendering time
 _END_S = 0.5  # the last picture of an episode stays this long
 
 
-def film(path: Path, result: Episodes) -> None:
+def film(path: Path, result: Episodes, size: tuple[int, int] = FILM_SIZE) -> None:
     """Write a typical episode of up to STYLES styles, one after the other, with a label each."""
     imageio = require()
     env = result.task.environment
@@ -45,14 +47,14 @@ def film(path: Path, result: Episodes) -> None:
             for number, episode in enumerate(chosen, 1):
                 frames = result.trace.qpos[result.trace.running[:, episode], episode]
                 text = f"{number} of {len(chosen)}: {label(result, episode)}"
-                images = render(env.character.model, frames)
+                images = render(env.character.model, frames, size)
                 for image in images + images[-1:] * round(_END_S * fps):
                     writer.append_data(caption(image, text))
                 display.update(number, number / (time.monotonic() - begin), {})
 
 
 def write_takes(path: Path, result: Episodes) -> None:
-    """The same episodes as animations of a GLB file."""
+    """The same episodes as animations of a GLB or USD file."""
     env = result.task.environment
     takes = [
         Take(
@@ -62,7 +64,13 @@ def write_takes(path: Path, result: Episodes) -> None:
         )
         for episode in typical(result, STYLES)
     ]
-    write_glb(path, env.character, takes)
+    files.write_takes(path, env.character, takes)
+
+
+def most_typical(result: Episodes) -> np.ndarray:
+    """Poses [F, 7 + J] of a typical episode of the first style."""
+    episode = typical(result, 1)[0]
+    return result.trace.qpos[result.trace.running[:, episode], episode]
 
 
 def typical(result: Episodes, most: int) -> list[int]:
@@ -209,14 +217,14 @@ def _renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Renderer:
     )
 
 
-def require() -> Any:
+def require(needed_by: str = "--video") -> Any:
     """The module that writes films, or ConfigError that says how to get it."""
     try:
         import imageio.v2 as imageio  # pyright: ignore[reportMissingImports]
         import imageio_ffmpeg  # noqa: F401  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise ConfigError(
-            "--video: needs imageio and its ffmpeg; install the extra: "
+            f"{needed_by}: needs imageio and its ffmpeg; install the extra: "
             "pip install 'getup-jax[video]'"
         ) from error
     return imageio

@@ -21,8 +21,9 @@ from getup_jax.evaluation import control_gain
 from getup_jax.evaluation.control_gain import ControlGain
 from getup_jax.evaluation.ground_kinds import Places
 from getup_jax.evaluation.metrics import Scores, episode_values, score
+from getup_jax.evaluation.outside import OutsidePolicy
 from getup_jax.evaluation.reference_error import reference_errors
-from getup_jax.evaluation.rollout import Episodes, run_episodes
+from getup_jax.evaluation.rollout import Episodes, Progress, run_episodes
 from getup_jax.evaluation.scenario import (
     DROPPED,
     Plan,
@@ -38,6 +39,7 @@ from getup_jax.physics.body_digest import body_digest, warn_if_other
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain_map import REGIONS
 from getup_jax.pose_prior import prior as pose_prior
+from getup_jax.pose_prior.prior import PosePrior
 from getup_jax.rl.learner import Learner, make_learner
 from getup_jax.rl.state import PolicyState
 from getup_jax.runtime.checkpoint import LoadedPolicy
@@ -45,6 +47,7 @@ from getup_jax.runtime.console import Display
 from getup_jax.runtime.pytree_store import from_nested
 
 _EPISODES = 100  # by default; on irregular ground in each region
+_NEVER_S = 3600.0  # longer than any episode
 _DROPS, _FLAT_DROPS = 1500, 500  # bodies that fall on irregular ground, and on flat ground
 
 Choice = Callable[[tuple[GetUp, ...], CharacterSpec], tuple[GetUp, ...]]
@@ -52,22 +55,61 @@ Choice = Callable[[tuple[GetUp, ...], CharacterSpec], tuple[GetUp, ...]]
 
 def evaluate(loaded: LoadedPolicy, scenario: Scenario, display: Display) -> tuple[Episodes, Scores]:
     """Run and score the episodes; raises ConfigError where the policy cannot be asked that."""
-    config = evaluation_config(loaded.config, scenario)
-    number = config.task.pool_size
-    prior = pose_prior.from_checkpoint(loaded.prior)
-    task = build_task(config, display.log, prior, chosen_styles(config, scenario))
-    body = body_digest(task.environment.character.model)
-    warn_if_other(loaded.path, loaded.metadata, body, display.log)
-    learner, policy = restore_policy(loaded, task)
-    *_, num_styles, rows = task.world.pool.table.shape
-    plan = make_plan(scenario, number, num_styles, rows)
-    if task.world.pool.startable is not None:
-        plan = plan.on_regions(task.world.pool)
-    display.log("compiling the episode ...")
-    episodes = run_episodes(task, learner, policy, plan, Rate(display, number))
-    places = _places(config, task, plan)
-    scores = score(_values(episodes), plan.getup, task.getups, scenario.kind, places)
-    return episodes, scores
+    number = evaluation_config(loaded.config, scenario).task.pool_size
+    episodes = run(Entry.of(loaded), scenario, display.log, Rate(display, number))
+    return episodes, scores_of(episodes)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Entry:
+    """Who is evaluated, under which config: a policy of this package, or one from outside."""
+
+    policy: LoadedPolicy | OutsidePolicy
+    config: Config
+    name: str  # for people
+
+    @classmethod
+    def of(cls, loaded: LoadedPolicy) -> Entry:
+        """A policy as it was trained."""
+        return cls(loaded, loaded.config, str(loaded.path))
+
+    @property
+    def prior(self) -> PosePrior | None:
+        """What its latent actions mean; None: there are none."""
+        outside = isinstance(self.policy, OutsidePolicy)
+        return None if outside else pose_prior.from_checkpoint(self.policy.prior)
+
+
+def run(
+    entry: Entry, scenario: Scenario, log: Callable[[str], None], progress: Progress
+) -> Episodes:
+    """The episodes of a scenario; raises ConfigError where the policy cannot be asked that."""
+    config, policy = evaluation_config(entry.config, scenario), entry.policy
+    task = build_task(config, log, entry.prior, chosen_styles(config, scenario))
+    learner: Learner | None = None
+    state: Any = policy
+    if not isinstance(policy, OutsidePolicy):
+        body = body_digest(task.environment.character.model)
+        warn_if_other(policy.path, policy.metadata, body, log)
+        learner, state = restore_policy(policy, task)
+    plan = planned(task, scenario, config.task.pool_size)
+    log("compiling the episode ...")
+    return run_episodes(task, learner, state, plan, progress)
+
+
+def planned(task: BuiltTask, scenario: Scenario, number: int) -> Plan:
+    """The episodes of a scenario in a task that was built for it."""
+    pool = task.world.pool
+    _, regions, num_styles, rows = pool.table.shape
+    if pool.startable is None:
+        return make_plan(scenario, number, num_styles, rows)
+    return make_plan(scenario, number, num_styles, rows, regions).on_regions(pool)
+
+
+def scores_of(episodes: Episodes) -> Scores:
+    """What the episodes come to."""
+    plan, getups = episodes.plan, episodes.task.getups
+    return score(_values(episodes), plan.getup, getups, plan.kind, places_of(episodes))
 
 
 def _values(episodes: Episodes) -> dict[str, np.ndarray]:
@@ -80,14 +122,16 @@ def _values(episodes: Episodes) -> dict[str, np.ndarray]:
     return values | {"reference_error_m": errors}
 
 
-def _places(config: Config, task: BuiltTask, plan: Plan) -> Places | None:
+def places_of(episodes: Episodes) -> Places | None:
     """Where the episodes start on irregular ground; None on a flat plane."""
-    if config.terrain is None or plan.region is None:
+    task, plan = episodes.task, episodes.plan
+    terrain = task.environment.terrain
+    if terrain is None or plan.region is None:
         return None
     pool = task.world.pool
     index = np.asarray(pool.table)[plan.kind, plan.region, plan.getup, plan.row]
     xy = np.asarray(pool.physics.kinematics.qpos)[index, :2]
-    return Places.of(plan.region, xy, config.terrain)
+    return Places.of(plan.region, xy, terrain)
 
 
 def evaluate_edits(
@@ -120,6 +164,7 @@ def evaluation_config(config: Config, scenario: Scenario) -> Config:
         terminate_reward=TaskConfig.terminate_reward,
         pool_size=_episode_count(config, scenario),
         stand_time_s=stand_time_s,
+        terminate_after_s=task.terminate_after_s if scenario.early_ends else _NEVER_S,
         **_dropped(task, scenario.drops),
     )
     terrain = _evaluation_terrain(config.terrain, scenario.terrain_seed)

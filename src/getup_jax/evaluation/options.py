@@ -65,6 +65,37 @@ def eval_parser() -> argparse.ArgumentParser:
     return parser
 
 
+_BENCH_EXAMPLES = """\
+examples:
+  getup-bench flat --quick                 a minute, to see that a policy runs
+  getup-bench runs/mine --json mine.json   the whole benchmark
+  getup-bench mine.onnx                    a policy of getup-export, or one graph; docs/bench.md
+  getup-bench my_policies:Crawl            a function or class in my_policies.py
+"""
+
+
+def bench_parser() -> argparse.ArgumentParser:
+    """The parser of `getup-bench`."""
+    parser = argparse.ArgumentParser(
+        prog="getup-bench",
+        description="Let a policy get up from fixed starts, on fixed grounds, with pushes; success "
+        "is told by our rule, by those of the papers that it is after, and by HoST's.",
+        epilog=_BENCH_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add(
+        "policy",
+        metavar="POLICY",
+        help="a shipped policy's name, a run folder, a checkpoint, hf://OWNER/NAME, an .onnx "
+        "file, or MODULE:FUNCTION",
+    )
+    add("--quick", action="store_true", help="one round of one suite")
+    add("--json", type=output(".json"), metavar="FILE", help="the results; a .json file")
+    add("--engine", metavar="E", help="native, mjx or mjx-warp (default: as for training)")
+    return parser
+
+
 def add_checkpoint(parser: argparse.ArgumentParser) -> None:
     """The argument --ckpt."""
     parser.add_argument(
@@ -149,10 +180,29 @@ def _add_outputs(group: argparse._ArgumentGroup) -> None:
         help="a typical episode of several styles; an .mp4 file",
     )
     add(
+        "--size",
+        type=_size,
+        default=(720, 1280),
+        metavar="WxH",
+        help="of the film in pixels, even numbers (default: 1280x720)",
+    )
+    add(
+        "--turntable",
+        type=output(".png", ".jpg"),
+        metavar="FILE",
+        help="a typical episode at four moments from six sides; a .png or .jpg file",
+    )
+    add(
         "--glb",
         type=output(".glb"),
         metavar="FILE",
         help="the same episodes as animations of a mesh, for Blender and browsers; a .glb file",
+    )
+    add(
+        "--usd",
+        type=output(".usd", ".usda", ".usdc"),
+        metavar="FILE",
+        help="the same as USD, one after the other on its time line; .usd, .usda or .usdc",
     )
     add(
         "--plot",
@@ -204,6 +254,17 @@ def low_high(text: str) -> tuple[float, float]:
     if low > high:
         raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
     return low, high
+
+
+def _size(text: str) -> tuple[int, int]:
+    """Rows and columns of WIDTHxHEIGHT; film formats want even numbers."""
+    width, _, height = text.partition("x")
+    found = [int(x) if x.isascii() and x.isdigit() else 0 for x in (height, width)]
+    if not all(16 <= x <= 4096 and x % 2 == 0 for x in found):
+        raise argparse.ArgumentTypeError(
+            f"expected WIDTHxHEIGHT in even numbers from 16 to 4096, such as 1280x720, got {text!r}"
+        )
+    return found[0], found[1]
 
 
 def _number(text: str, fits: Callable[[float], bool], expected: str) -> float:

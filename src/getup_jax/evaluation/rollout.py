@@ -12,12 +12,14 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
+from getup_jax.envs.getup import terminations
 from getup_jax.envs.getup.build import BuiltTask
 from getup_jax.envs.getup.drawn_curves import Curve, style_curve
 from getup_jax.envs.getup.episode import LYING, STANDING, EpisodeState
 from getup_jax.envs.getup.task import GetUpTask
 from getup_jax.evaluation import motion_quality
 from getup_jax.evaluation.motion_quality import FootPoints, self_penetration
+from getup_jax.evaluation.outside import Acting, OutsidePolicy, seen, to_action
 from getup_jax.evaluation.scenario import PUSH_AFTER_S, Plan
 from getup_jax.motion.clips import GetUp
 from getup_jax.physics.push import push
@@ -50,6 +52,7 @@ class Trace:
     slip: Any  # [T, N] m/s of the feet on the ground; NaN: no foot is
     running: Any  # [T, N] the step belongs to the episode
     success: Any  # [T, N] the episode ended here, standing
+    head_gap: Any  # [T, N] m from the head's lowest point to the ground
     pushed: Any = None  # [T, N] an impulse came before this step
     penetration: Any = None  # [T, N] deepest overlap of two links (m); NaN where not looked at
 
@@ -87,7 +90,7 @@ class Roller:
     """The jitted part: `start`, and CHUNK steps at a time with `advance`."""
 
     env: GetUpTask
-    learner: Learner
+    learner: Learner | None  # None: a policy from outside acts, see `run_episodes`
     kind: int
     feet: FootPoints
 
@@ -108,16 +111,21 @@ class Roller:
 
     def advance(self, world: Any, policy: Any, carry: Carry) -> tuple[Carry, Trace]:
         """CHUNK control steps; the trace's leaves are [CHUNK, B, ...]."""
+        learner = self.learner
+        assert learner is not None  # `_advance` has seen to it
 
         def step(carry: Carry, _: None) -> tuple[Carry, Trace]:
-            action = self.learner.act(policy, carry.state.observation)
-            state, output = self.env.advance(world, carry.state, action)
-            rates = jnp.concatenate([carry.rates, state.physics.kinematics.qvel[None, :, 6:]])
-            trace = self._trace(world, carry.running, state, output, rates)
-            running = carry.running & ~output.done
-            return Carry(state, running, rates[1:]), trace
+            return self.step(world, carry, learner.act(policy, carry.state.observation))
 
         return jax.lax.scan(step, carry, None, length=CHUNK)
+
+    def step(self, world: Any, carry: Carry, action: jax.Array) -> tuple[Carry, Trace]:
+        """One control step with actions [B, A]; the trace's leaves are [B, ...]."""
+        state, output = self.env.advance(world, carry.state, action)
+        rates = jnp.concatenate([carry.rates, state.physics.kinematics.qvel[None, :, 6:]])
+        trace = self._trace(world, carry.running, state, output, rates)
+        running = carry.running & ~output.done
+        return Carry(state, running, rates[1:]), trace
 
     def _trace(
         self, world: Any, running: jax.Array, state: EpisodeState, output: Any, rates: jax.Array
@@ -141,18 +149,22 @@ class Roller:
             slip=self.feet.slip(kinematics, world.terrain),
             running=running,
             success=running & (output.episode[verdict] == 1.0),
+            head_gap=terminations.head_gap(env.character, world.terrain, kinematics),
         )
 
 
 def run_episodes(
-    task: BuiltTask, learner: Learner, policy: Any, plan: Plan, progress: Progress
+    task: BuiltTask, learner: Learner | None, policy: Any, plan: Plan, progress: Progress
 ) -> Episodes:
-    """The plan's N episodes in batches of one size; the trace's leaves are NumPy arrays."""
+    """The plan's N episodes in batches of one size; the trace's leaves are NumPy arrays.
+
+    policy: a PolicyState of the learner; or, with no learner, an OutsidePolicy.
+    """
     env = task.environment
     roller = Roller(env, learner, plan.kind, FootPoints.of(env.character))
     options = env.engine.compiler_options
     start = jax.jit(roller.start, compiler_options=options)
-    advance = jax.jit(roller.advance, compiler_options=options)
+    advance = _advance(roller, options)
     episodes, parts, curves = len(plan.getup), [], plan_curves(task, plan)
     size = math.ceil(episodes / math.ceil(episodes / BATCH))
     most = episode_steps(task, plan)
@@ -164,12 +176,32 @@ def run_episodes(
         curve = jax.tree.map(lambda x, index=index: x[index], curves)
         carry = start(task.world, plan.getup[index], plan.row[index], curve, region)
         chunks = []
-        for chunk in _chunks(task, advance, policy, carry, plan.impulse[index]):
+        acting = policy.begun() if isinstance(policy, OutsidePolicy) else policy
+        for chunk in _chunks(task, advance, acting, carry, plan.impulse[index]):
             chunks.append(jax.tree.map(lambda x, keep=keep: x[:, :keep], chunk))
             progress(first + keep * min(1.0, CHUNK * len(chunks) / most))
         parts.append(jax.tree.map(lambda *x: np.concatenate(x), *chunks))
         progress(first + keep)
     return Episodes(task, plan, _join(parts))
+
+
+def _advance(roller: Roller, options: Any) -> Callable[[Any, Any, Carry], tuple[Carry, Trace]]:
+    """CHUNK control steps: one program, or, where a policy from outside acts, step by step."""
+    if roller.learner is not None:
+        return jax.jit(roller.advance, compiler_options=options)
+    step = jax.jit(roller.step, compiler_options=options)
+    look = jax.jit(lambda world, state: seen(roller.env, world, state))
+
+    def advance(world: Any, policy: Acting, carry: Carry) -> tuple[Carry, Trace]:
+        parts, state = [], policy.state or jax.device_get(look(world, carry.state))
+        for _ in range(CHUNK):
+            carry, trace = step(world, carry, to_action(roller.env, policy.act(state)))
+            state = jax.device_get(look(world, carry.state))
+            parts.append(jax.device_get(trace))
+        policy.state = state
+        return carry, jax.tree.map(lambda *x: np.stack(x), *parts)
+
+    return advance
 
 
 def plan_curves(task: BuiltTask, plan: Plan) -> Curve:

@@ -41,6 +41,7 @@ class Scenario:
     duration_scale: tuple[float, float] = (1.0, 1.0)  # each episode's T is multiplied by U(a, b)
     blend: str | None = None  # half | random: mixtures of two curves; None: the curves themselves
     push_ns: float | None = None  # impulse to the chest while standing
+    pushes_ns: tuple[float, ...] = ()  # several of them, each for all styles in turn; 0: no push
     edits: int = 0  # variants of each curve, run beside the episodes for the control gain
     seed: int = 0
     curves: tuple[str, ...] = ()  # curve files in place of the trained styles
@@ -50,6 +51,8 @@ class Scenario:
     stand_time_s: float | None = None  # to stand after the curve's end; None: as in training
     terrain_seed: int | None = None  # of the irregular ground; None: that of the training
     engine: str | None = None  # native | mjx; None: as in training
+    # False: an episode that would end early goes on; `evaluation/verdicts.py` says that it did
+    early_ends: bool = True
 
     @property
     def kind(self) -> int:
@@ -63,7 +66,8 @@ class Scenario:
         if self.edits and self.kind == STANDING:
             raise ConfigError("--edits: are of the rise, so expected --start lying, got standing")
         stand_s = config.task.stand_time_s
-        if self.push_ns is not None and stand_s <= PUSH_AFTER_S:
+        pushed = self.push_ns is not None or any(self.pushes_ns)
+        if pushed and stand_s <= PUSH_AFTER_S:
             raise ConfigError(
                 f"--push: comes {PUSH_AFTER_S:g} s after the curve's end, but the standing phase "
                 f"lasts {stand_s:g} s; give a longer --stand-time"
@@ -75,7 +79,7 @@ class Scenario:
             "--curves": bool(self.curves),
             "--motions": self.motions is not None,
             "--blend": self.blend is not None,
-            "--push": self.push_ns is not None,
+            "--push": self.push_ns is not None or bool(self.pushes_ns),
             "--drops": self.drops is not None,
             "--edits": self.edits > 0,
             "--start standing": self.start == "standing",
@@ -107,10 +111,17 @@ class Plan:
         return dataclasses.replace(self, getup=getup, row=row, region=region)
 
 
-def make_plan(scenario: Scenario, episodes: int, num_styles: int, rows: int) -> Plan:
-    """The styles in turn, each with one start of the pool after the other."""
+def make_plan(
+    scenario: Scenario, episodes: int, num_styles: int, rows: int, regions: int = 1
+) -> Plan:
+    """The styles in turn, each with one start of the pool after the other.
+
+    Where there are several pushes, all styles (in all regions) have one before the next one comes.
+    """
     rng = np.random.default_rng(scenario.seed)
     number = np.arange(episodes)
+    pushes = np.array(scenario.pushes_ns or (scenario.push_ns or 0.0,))
+    push = pushes[number // (num_styles * regions) % len(pushes)]
     angle = rng.uniform(-np.pi, np.pi, episodes)
     direction = np.stack([np.cos(angle), np.sin(angle), np.zeros(episodes)], axis=-1)
     return Plan(
@@ -118,7 +129,7 @@ def make_plan(scenario: Scenario, episodes: int, num_styles: int, rows: int) -> 
         getup=(number % num_styles).astype(np.int32),
         row=(number // num_styles % rows).astype(np.int32),
         duration_scale=rng.uniform(*scenario.duration_scale, episodes).astype(np.float32),
-        impulse=(scenario.push_ns or 0.0) * direction,
+        impulse=push[:, None] * direction,
     )
 
 

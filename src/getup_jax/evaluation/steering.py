@@ -58,9 +58,9 @@ def steer(loaded: LoadedPolicy, scenario: Scenario, script: Script) -> tuple[Cou
         return run_script(players, script, scenario.seed), players[None].task
 
 
-def film(path: Path, env: CompositeTask, course: Course) -> None:
-    """The whole course, with what the character is told."""
-    write(path, env, [(course.qpos, course.markers, course.lines)])
+def film(path: Path, env: CompositeTask, course: Course, size: tuple[int, int]) -> None:
+    """The whole course, with what the character is told; size: rows and columns."""
+    write(path, env, [(course.qpos, course.markers, course.lines)], size)
 
 
 def to_json(course: Course) -> dict[str, Any]:

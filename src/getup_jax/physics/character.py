@@ -12,6 +12,7 @@ import numpy as np
 
 from getup_jax.config import ConfigError, PhysicsConfig
 from getup_jax.core.resources import asset_path
+from getup_jax.physics.character_map import SUFFIX, read_mapped
 from getup_jax.physics.props import Equipment, add_balls, add_racket
 from getup_jax.physics.requirements import check_character, hinges_of
 from getup_jax.physics.terrain_map import TerrainMap
@@ -88,7 +89,7 @@ def load_character(
     The character stands on its file's floor, a plane, or on the given ground in place of it,
     with the given equipment. Raises ConfigError where the file lacks what docs/character.md lists.
     """
-    spec = _read(config.character)
+    spec = read_spec(config.character)
     if ground is not None:
         replace_floor(spec, ground)
     balls = equipment.balls if equipment else ()
@@ -121,18 +122,24 @@ def load_character(
 
 
 def character_file(name: str) -> Path:
-    """The MJCF file of a shipped character, or the path itself."""
-    path = Path(name) if name.endswith(".xml") else asset_path(f"{name}.xml")
+    """The MJCF file of a shipped character, or the path itself, also of a map of names."""
+    own = name.endswith((".xml", SUFFIX))
+    path = Path(name) if own else asset_path(f"{name}.xml")
     if not path.is_file():
         shipped = sorted(p.stem for p in asset_path().glob("*.xml"))
         raise ConfigError(f"physics.character: no file {path}; shipped characters: {shipped}")
     return path
 
 
-def _read(name: str) -> mujoco.MjSpec:
+def read_spec(name: str) -> mujoco.MjSpec:
+    """The character of a name, a file or a map, as its file has it; raises ConfigError."""
     file = character_file(name)
     try:
+        if file.suffix == SUFFIX:
+            return read_mapped(file)
         return mujoco.MjSpec.from_file(str(file))
+    except ConfigError:
+        raise
     except _REFUSALS as error:
         raise _refused(name, error) from None
 

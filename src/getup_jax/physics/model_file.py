@@ -5,12 +5,12 @@ from __future__ import annotations
 import mujoco
 
 from getup_jax.config import PhysicsConfig
-from getup_jax.physics.character import SOLVERS, character_file
+from getup_jax.physics.character import SOLVERS, read_spec
 
 
 def character_xml(config: PhysicsConfig) -> str:
     """MJCF that compiles to the model of `load_character`, on its floor; for MuJoCo alone."""
-    spec = mujoco.MjSpec.from_file(str(character_file(config.character)))
+    spec = read_spec(config.character)
     spec.option.timestep = 1.0 / (config.control_hz * config.substeps)
     spec.option.solver = SOLVERS[config.solver]
     spec.option.iterations = config.iterations

@@ -7,32 +7,20 @@ character's own frames: metres, the root's translation, and rotations.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from getup_jax.motion.clips import continuous_signs
 from getup_jax.motion.io.geom_meshes import link_meshes
+from getup_jax.motion.io.takes import Take, local_poses
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.runtime.extras import load_extra
 
 _UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # x y z w: a quarter turn about x, from Z up to Y up
 _FLOAT, _INT = 5126, 5125  # component types of glTF
 _VERTICES, _INDICES = 34962, 34963  # buffer targets of glTF
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Take:
-    """One motion of the character."""
-
-    name: str
-    fps: float
-    qpos: np.ndarray  # [F, 7 + J]
 
 
 def require_glb() -> Any:
@@ -51,7 +39,7 @@ def glb_bytes(character: CharacterSpec, takes: Sequence[Take]) -> bytes:
     Raises ConfigError where the extra `glb` is missing.
     """
     file = _File(require_glb())
-    rest = _local_poses(character, character.neutral_qpos[None])
+    rest = local_poses(character, character.neutral_qpos[None])
     gl = file.gl
     meshes = link_meshes(character)
     for link, name in enumerate(character.link_names):
@@ -67,30 +55,8 @@ def glb_bytes(character: CharacterSpec, takes: Sequence[Take]) -> bytes:
     file.document.scenes = [gl.Scene(nodes=[len(file.document.nodes) - 1])]
     file.document.scene = 0
     for take in takes:
-        file.animation(take, *_local_poses(character, take.qpos))
+        file.animation(take, *local_poses(character, take.qpos))
     return file.content()
-
-
-def _local_poses(character: CharacterSpec, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places [F, L, 3] (m) and rotations [F, L, 4] (x y z w) of links in their parents."""
-    model, links = character.model, len(character.link_names)
-    data = mujoco.MjData(model)
-    position, world = np.empty((len(qpos), links, 3)), np.empty((len(qpos), links, 4))
-    for frame, row in enumerate(qpos):
-        data.qpos[:] = row
-        mujoco.mj_kinematics(model, data)
-        position[frame], world[frame] = data.xpos[1:], data.xquat[1:]
-    local = world.copy()
-    place = np.tile(model.body_pos[1:], (len(qpos), 1, 1))
-    place[:, 0] = position[:, 0]
-    for link, parent in enumerate(model.body_parentid[1:] - 1):
-        if parent >= 0:
-            turn = Rotation.from_quat(world[:, parent], scalar_first=True).inv()
-            own = turn * Rotation.from_quat(world[:, link], scalar_first=True)
-            local[:, link] = own.as_quat(scalar_first=True)
-        # rotations are interpolated the short way
-        local[1:, link] *= continuous_signs(local[:, link])[1:]
-    return place, np.roll(local, -1, axis=-1)
 
 
 class _File:
