@@ -91,7 +91,8 @@ def make_teacher(
     model = make_actor_critic(old, loaded.config.network, config.ppo.normalize_observation)
     policy = own
     if not config.train.init_learner:
-        template = model.init(jax.random.PRNGKey(0), config.ppo).policy
+        key = jax.random.PRNGKey(0)
+        template = jax.eval_shape(lambda key: model.init(key, config.ppo).policy, key)
         policy = from_nested(template, loaded.policy, str(loaded.path))
     neutral = env.decoder(world).neutral
     decoder = ActionDecoder(prior, loaded.config.task.offset_scale, neutral)
