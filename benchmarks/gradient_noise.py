@@ -24,7 +24,7 @@ import numpy as np
 from getup_jax.config import Config
 from getup_jax.config.load import load_saved_config
 from getup_jax.networks import gaussian
-from getup_jax.rl import ppo
+from getup_jax.rl import ppo, schedule
 from getup_jax.rl.actor_critic import normalized
 from getup_jax.rl.gae import gae
 from getup_jax.rl.learner import Learner
@@ -97,12 +97,11 @@ def measure(
     return np.asarray(found)
 
 
-def _std(config: Config, iteration: int) -> float:
+def _std(config: Config, iteration: int) -> jax.Array:
     """The noise of the stage that the run is in."""
-    first, last = config.ppo.action_std[0], config.ppo.action_std[-1]
     progress = iteration * steps_per_iteration(config) / config.train.total_steps
-    stage = min(int(progress * config.ppo.stages), config.ppo.stages - 1)
-    return first + (last - first) * stage / max(config.ppo.stages - 1, 1)
+    first, last = config.ppo.action_std[0], config.ppo.action_std[-1]
+    return schedule.value(first, last, config.ppo.stages, jnp.asarray(progress, jnp.float32))
 
 
 def _play(

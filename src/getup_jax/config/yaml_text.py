@@ -7,11 +7,12 @@ PyYAML's errors span several lines, and its conversions raise whatever Python's 
 from __future__ import annotations
 
 from collections.abc import Hashable
+from pathlib import Path
 from typing import Any
 
 import yaml
 
-from getup_jax.config.check import shown
+from getup_jax.config.check import ConfigError, shown
 
 MOST_BYTES = 500_000
 _DEEPEST = 40  # nested lists and mappings
@@ -24,6 +25,17 @@ class YamlError(ValueError):
     def __init__(self, problem: str, line: int | None = None) -> None:
         super().__init__(problem)
         self.line = line
+
+
+def read(path: Path) -> Any:
+    """The value in a YAML file; ConfigError says why there is none, and in which line."""
+    try:
+        return parse(path.read_bytes())
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except YamlError as error:
+        place = "" if error.line is None else f", line {error.line}"
+        raise ConfigError(f"{path}{place}: not YAML: {error}") from None
 
 
 def parse(text: str | bytes) -> Any:

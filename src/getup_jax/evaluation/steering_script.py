@@ -53,13 +53,7 @@ class Script:
 
 def read_script(path: Path) -> Script:
     """Read a command file; ConfigError names the place and what was expected."""
-    try:
-        content = yaml_text.parse(path.read_bytes())
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except yaml_text.YamlError as error:
-        place = "" if error.line is None else f", line {error.line}"
-        raise ConfigError(f"{path}{place}: not YAML: {error}") from None
+    content = yaml_text.read(path)
     if not isinstance(content, Mapping) or not isinstance(content.get("commands"), list):
         raise ConfigError(f"{path}: expected {_FORM}")
     for key in content:

@@ -45,13 +45,7 @@ def read_mapped(path: Path) -> mujoco.MjSpec:
 
 
 def _content(path: Path) -> Mapping[str, Any]:
-    try:
-        content = yaml_text.parse(path.read_bytes())
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except yaml_text.YamlError as error:
-        place = "" if error.line is None else f", line {error.line}"
-        raise ConfigError(f"{path}{place}: not YAML: {error}") from None
+    content = yaml_text.read(path)
     if not isinstance(content, Mapping) or not isinstance(content.get("mjcf"), str):
         raise ConfigError(
             f"{path}: expected a map of a character, with mjcf: FILE.xml and names; see "
