@@ -11,8 +11,6 @@ Needs a run folder with learner checkpoints, of the get-up task.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
@@ -20,14 +18,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.config import Config
-from getup_jax.config.load import load_saved_config
 from getup_jax.networks import gaussian
 from getup_jax.rl.actor_critic import normalized
 from getup_jax.rl.gae import gae
 from getup_jax.rl.learner import Learner
 from getup_jax.runtime import checkpoint
-from getup_jax.runtime.pytree_store import from_nested
 from getup_jax.training.run import build_job
+from support.trained_run import learner_state, load_run, parser_of_run
 
 PHASES = ((0.0, 0.25), (0.25, 0.5), (0.5, 0.75), (0.75, 1.0), (1.0, np.inf))
 
@@ -45,20 +42,14 @@ class Steps(NamedTuple):
 
 def main() -> None:
     """Print the table of a run."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("run", type=Path, nargs="?", help="a run folder of the get-up task")
+    parser = parser_of_run(__doc__, quick="two seconds")
     parser.add_argument("--simulations", type=int, default=256)
     parser.add_argument("--seconds", type=float, default=20.0, help="of every simulation")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--quick", action="store_true", help="for `make bench`: two seconds")
     args = parser.parse_args()
-    if args.run is None:
-        print("skipped: needs a run folder")
+    found = load_run(args.run)
+    if found is None:
         return
-    loaded = checkpoint.load_learner(args.run)
-    config = load_saved_config(loaded.path.parent / "config.yaml")
+    config, loaded = found
     seconds = 2.0 if args.quick else args.seconds
     steps = collect(config, loaded, args.simulations, seconds, args.seed)
     print(table(config, steps))
@@ -70,8 +61,7 @@ def collect(
     """Steps of the run's policy with the noise of its last stage."""
     job = build_job(config, print)
     learner: Learner = job.learner
-    template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0))
-    trained = from_nested(template, loaded.learner, str(loaded.path))
+    trained = learner_state(learner, loaded)
     std = jnp.full(learner.env.action_size, config.ppo.action_std[-1])
     key_init, key_roll = jax.random.split(jax.random.PRNGKey(seed))
 

@@ -13,8 +13,6 @@ task.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
@@ -22,16 +20,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.config import Config
-from getup_jax.config.load import load_saved_config
 from getup_jax.networks import gaussian
 from getup_jax.rl import ppo, schedule
 from getup_jax.rl.actor_critic import normalized
 from getup_jax.rl.gae import gae
 from getup_jax.rl.learner import Learner
 from getup_jax.runtime import checkpoint
-from getup_jax.runtime.pytree_store import from_nested
 from getup_jax.training.loop import steps_per_iteration
 from getup_jax.training.run import build_job
+from support.trained_run import learner_state, load_run, parser_of_run
 
 PARTS = 4  # of the simulations, each with a gradient of its own
 
@@ -50,20 +47,14 @@ class Steps(NamedTuple):
 
 def main() -> None:
     """Print the table of a run."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("run", type=Path, nargs="?", help="a run folder of the get-up task")
+    parser = parser_of_run(__doc__, quick="two rollouts")
     parser.add_argument("--lambdas", type=float, nargs="+", default=[0.95, 0.8, 0.5, 0.2])
     parser.add_argument("--rollouts", type=int, default=6, help="as large as those of the run")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--quick", action="store_true", help="for `make bench`: two rollouts")
     args = parser.parse_args()
-    if args.run is None:
-        print("skipped: needs a run folder")
+    found = load_run(args.run)
+    if found is None:
         return
-    loaded = checkpoint.load_learner(args.run)
-    config = load_saved_config(loaded.path.parent / "config.yaml")
+    config, loaded = found
     rollouts = 2 if args.quick else args.rollouts
     gradients = measure(config, loaded, args.lambdas, rollouts, args.seed)
     print(table(config, args.lambdas, gradients))
@@ -79,8 +70,7 @@ def measure(
     """Policy gradients [PARTS x rollouts, lambdas, weights] of the run's objectives together."""
     job = build_job(config, print)
     learner, world = job.learner, jax.device_put(job.world)
-    template = jax.eval_shape(learner.init_learner, jax.random.PRNGKey(0))
-    trained = from_nested(template, loaded.learner, str(loaded.path))
+    trained = learner_state(learner, loaded)
     iteration = int(loaded.path.parent.name)  # its checkpoint is called by it
     std = jnp.full(learner.env.action_size, _std(config, iteration))
     key_init, key_roll = jax.random.split(jax.random.PRNGKey(seed))
