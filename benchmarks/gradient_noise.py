@@ -114,7 +114,7 @@ def _gradient(
 ) -> jax.Array:
     """The policy gradient [weights] of the weighted, standardised advantages of some steps."""
     rows = (steps.reward, steps.value, steps.next_value, steps.terminated, steps.truncated)
-    advantage, _ = gae(*rows, learner.config.discount, trace)  # pyright: ignore[reportArgumentType]
+    advantage, _ = gae(*rows, learner.discount, trace)  # pyright: ignore[reportArgumentType]
     advantage = ppo.standardize(advantage) @ jnp.asarray(learner.weights)
 
     def gain(actor: Any) -> jax.Array:

@@ -92,3 +92,12 @@ def test_value_after_a_termination_is_not_read():
     broken = np.where(terminated[..., None], np.nan, next_value)
     found, _ = gae(reward, value, broken, terminated, truncated, 0.9, 0.95)
     np.testing.assert_array_equal(found, expected)
+
+
+def test_every_objective_may_have_a_discount_of_its_own():
+    data, discounts = _data(), (0.9, 0.5, 0.99)
+    advantage, target = gae(*data, np.asarray(discounts, np.float32), 0.7)
+    for k, discount in enumerate(discounts):
+        alone, alone_target = gae(*(x[..., k] if x.ndim == 3 else x for x in data), discount, 0.7)
+        np.testing.assert_allclose(advantage[..., k], alone, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(target[..., k], alone_target, rtol=1e-5, atol=1e-6)

@@ -7,7 +7,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from probes import Probe, make_world
 
 from getup_jax.config import NetworkConfig, PPOConfig
 from getup_jax.rl.actor_critic import normalized
@@ -16,6 +15,7 @@ from getup_jax.rl.learner import Learner, make_learner
 from getup_jax.rl.minibatch import adapt_scale, first_scale
 from getup_jax.rl.policy_update import COSINE_EVERY
 from getup_jax.rl.state import TrainState
+from probes import Probe, make_world
 
 NETWORK = NetworkConfig(hidden_sizes=(16,), activation="tanh")
 CONFIG = PPOConfig(
@@ -342,7 +342,7 @@ def test_the_critics_targets_may_have_a_lambda_of_their_own():
         def rollout(key: jax.Array):
             state = learner.init(world, key)
             transition = learner.collect(world, state).transition
-            return estimate(learner.model, state.learner, transition, config)[1]
+            return estimate(learner.model, state.learner, transition, config, config.discount)[1]
 
         return jax.jit(rollout)(jax.random.key(0))
 

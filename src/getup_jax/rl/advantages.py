@@ -21,9 +21,13 @@ _TRUNCATED_CHUNK = 128  # truncated steps whose values are computed at once
 
 
 def estimate(
-    model: ActorCritic, learner: LearnerState, transition: Transition, config: PPOConfig
+    model: ActorCritic,
+    learner: LearnerState,
+    transition: Transition,
+    config: PPOConfig,
+    discount: float | jax.Array,
 ) -> tuple[LearnerState, Samples, jax.Array]:
-    """Score a rollout of [T, B] steps.
+    """Score a rollout of [T, B] steps, with one discount or [K] of the objectives.
 
     Returns:
         The learner, with PopArt moved to the new targets where it is used; samples [T * B, ...];
@@ -33,7 +37,7 @@ def estimate(
     value = model.value(learner, observation)
     following = next_values(model, learner, transition, value)
     ends = transition.terminated, transition.truncated
-    estimated = functools.partial(gae, transition.reward, value, following, *ends, config.discount)
+    estimated = functools.partial(gae, transition.reward, value, following, *ends, discount)
     advantage, target = estimated(config.gae_lambda)
     if config.critic_lambda is not None:
         _, target = estimated(config.critic_lambda)

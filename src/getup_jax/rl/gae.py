@@ -13,7 +13,7 @@ def gae(
     next_value: jax.Array,
     terminated: jax.Array,
     truncated: jax.Array,
-    discount: float,
+    discount: float | jax.Array,
     gae_lambda: float,
 ) -> tuple[jax.Array, jax.Array]:
     """Advantages and value targets of T steps (Schulman et al. 2016, equations 11 to 16).
@@ -32,7 +32,7 @@ def gae(
             not read where terminated, and may be NaN there.
         terminated: [T, B] bool.
         truncated: [T, B] bool.
-        discount: per step.
+        discount: per step; one, or [K].
         gae_lambda: 0 is one-step temporal difference, 1 is Monte Carlo.
 
     Returns:

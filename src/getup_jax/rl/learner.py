@@ -69,7 +69,13 @@ class Learner:
     config: PPOConfig
     weights: tuple[float, ...]  # [K] of the critics, their sum is 1
     total_steps: int  # samples of the whole run
+    discounts: tuple[float, ...] | None = None  # [K] of the objectives; None: `config.discount`
     reward_model: RewardModel | None = None  # None: the environment gives all rewards
+
+    @property
+    def discount(self) -> float | jax.Array:
+        """One of all objectives, or [K]."""
+        return self.config.discount if self.discounts is None else jnp.asarray(self.discounts)
 
     def init(self, world: Any, key: jax.Array) -> TrainState:
         """The state before the first iteration."""
@@ -121,7 +127,9 @@ class Learner:
         learner, transition, of_rewards = self._rewarded(
             world, state.learner, collected.transition, jax.random.fold_in(key, _REWARDS)
         )
-        learner, samples, explained = estimate(self.model, learner, transition, self.config)
+        learner, samples, explained = estimate(
+            self.model, learner, transition, self.config, self.discount
+        )
         learner, metrics = self._improve(state.iteration, learner, samples, stage, key_update)
         policy = observe(learner.policy, collected.transition.observation, self.model.symmetry)
         metrics |= {
@@ -263,6 +271,7 @@ def make_learner(
     ppo_config: PPOConfig,
     total_steps: int,
     weights: Sequence[float] | None = None,
+    discounts: Sequence[float] | None = None,
     reward_model: RewardModel | None = None,
 ) -> Learner:
     """A learner for the environment.
@@ -274,6 +283,7 @@ def make_learner(
         total_steps: samples of the whole run, for the schedules.
         weights: [K] of the critics, scaled here to a sum of 1; None: those of the reward model, or
             all the same.
+        discounts: [K] of the objectives; None: `ppo.discount` for all.
         reward_model: of composite motion; None: the environment gives all rewards.
     """
     count = env.num_objectives
@@ -282,11 +292,14 @@ def make_learner(
     weights = list(weights)
     if len(weights) != count or min(weights) < 0 or sum(weights) == 0:
         raise ValueError(f"weights: expected {count} of at least 0, not all 0, got {weights}")
+    if discounts is not None and len(discounts) != count:
+        raise ValueError(f"discounts: expected {count}, got {list(discounts)}")
     return Learner(
         env=env,
         model=make_actor_critic(env, network_config, ppo_config.normalize_observation),
         config=ppo_config,
         weights=tuple(w / math.fsum(weights) for w in weights),
         total_steps=total_steps,
+        discounts=None if discounts is None else tuple(discounts),
         reward_model=reward_model,
     )

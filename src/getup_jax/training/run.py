@@ -60,6 +60,7 @@ def build_job(config: Config, log: Log) -> Job:
         config.ppo,
         total_steps=config.train.total_steps,
         weights=tuple(task.environment.objective_weights.values()),
+        discounts=task.environment.discounts(config.ppo.discount),
     )
     carry_over = _carry_over(learner, task.world, config)
     body = body_digest(task.environment.character.model)

@@ -72,6 +72,13 @@ class GetUpTask:
         track = {"track": config.track_weight} if config.track_weight > 0 else {}
         return dict.fromkeys(names, 1.0) | track
 
+    def discounts(self, usual: float) -> tuple[float, ...] | None:
+        """Those of the objectives [K]: the usual one, but for tracking; None: all have that."""
+        of_tracking = self.curriculum.config.track_discount
+        if of_tracking is None or "track" not in self.objective_weights:
+            return None
+        return (usual,) * (self.num_objectives - 1) + (of_tracking,)
+
     @property
     def _term_names(self) -> tuple[str, ...]:
         """Without a pose prior there is nothing that offsets could be unnatural to [P 6.4]."""

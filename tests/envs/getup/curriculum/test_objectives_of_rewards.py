@@ -13,6 +13,7 @@ from tiny_task import changed, tiny_task
 from getup_jax.config import Config, ConfigError, CurriculumConfig, NetworkConfig, PPOConfig
 from getup_jax.envs.getup.build import BuiltTask
 from getup_jax.envs.getup.episode import LYING
+from getup_jax.rl.learner import make_learner
 from getup_jax.training import run
 
 PPO = PPOConfig(num_envs=8, num_steps=3, epochs=1, minibatch_size=24, popart=True)
@@ -50,6 +51,18 @@ def test_what_is_paid_is_sharper_and_what_is_reported_is_the_papers(built, sharp
     jax.tree.map(np.testing.assert_array_equal, state.record, plain_state.record)
     assert plain.reward.shape == (4, 1)
     assert "track" not in plain.terms
+
+
+def test_tracking_may_have_a_discount_of_its_own(built, sharp):
+    assert sharp.environment.discounts(0.99) is None
+    assert built.environment.discounts(0.99) is None
+    aids = sharp.environment.curriculum
+    aids = dataclasses.replace(aids, config=dataclasses.replace(aids.config, track_discount=0.9))
+    env = dataclasses.replace(sharp.environment, curriculum=aids)
+    learner = make_learner(env, NETWORK, PPO, total_steps=100, discounts=env.discounts(0.99))
+    np.testing.assert_allclose(learner.discount, [0.99, 0.9])
+    with pytest.raises(ValueError, match="discounts: expected 2, got"):
+        make_learner(env, NETWORK, PPO, total_steps=100, discounts=[0.9])
 
 
 def test_a_grace_time_pays_no_objective(character):
