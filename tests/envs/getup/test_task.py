@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from compiled import compiled
 from tiny_task import LATENT, untrained_prior
 
 from getup_jax.config import CurriculumConfig
@@ -23,11 +24,11 @@ class Jitted:
 
     def __init__(self, built):
         self.task, self.world = built.environment, built.world
-        self.start_rows = jax.jit(self.task.start)
-        self.advance = jax.jit(self.task.advance)
-        self.step = jax.jit(self.task.step)
-        self.servo_target = jax.jit(self.task.servo_target)
-        self.play = jax.jit(self._play, static_argnums=2)
+        self.start_rows = compiled(self.task.start)
+        self.advance = compiled(self.task.advance)
+        self.step = compiled(self.task.step)
+        self.servo_target = compiled(self.task.servo_target)
+        self.play = compiled(self._play, static_argnums=2)
 
     def start(self, kind: int, style: int = CLIP_STYLE) -> EpisodeState:
         rows = jnp.arange(B, dtype=jnp.int32)
@@ -341,7 +342,7 @@ def test_the_same_key_gives_the_same_run(jitted):
     task, world = jitted.task, jitted.world
 
     def run(seed: int):
-        state = task.init(world, jax.random.PRNGKey(seed), B)
+        state = compiled(task.init, static_argnums=2)(world, jax.random.PRNGKey(seed), B)
         state = state.replace(time=state.duration + 3.0)  # all of them reset in the first step
         for _ in range(2):
             state, output = jitted.step(world, state, no_action())
