@@ -6,9 +6,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from compiled import compiled
 from tiny_task import LATENT, untrained_prior
 
+from compiled import compiled
 from getup_jax.config import CurriculumConfig
 from getup_jax.envs.getup.drawn_curves import style_curve
 from getup_jax.envs.getup.episode import CLIP, LYING, STANDING, EpisodeState
