@@ -2,13 +2,15 @@
 
     python benchmarks/scaling.py [--config flat] [--num-envs 512] [--rounds 7] [--json FILE]
 
-Four runs are compiled, wait, and then iterate in turn, again and again, so that a busy machine
+Five runs are compiled, wait, and then iterate in turn, again and again, so that a busy machine
 slows all of them alike:
 
   one       one process on one core, N simulations
   two       two processes on a core each, N simulations each     (weak scaling: two / one)
   strong    two processes on a core each, N / 2 simulations each (strong scaling: strong / one)
   both      one process on both cores, 2 N simulations           (two / both)
+  apart     two that are not joined, at once, N simulations each (apart / one: what the machine
+            allows, whose cores share caches and memory, and two / apart: what joining costs)
 
 With 2 N simulations the minibatches are twice as large, so that the updates are as many.
 
@@ -40,7 +42,13 @@ from support.projection import Iteration, Network, efficiency
 QUICK_MINIBATCH = 16
 LEAVE_S = 60
 ETHERNET, NVLINK = Network(latency_s=50e-6, bytes_per_s=3e9), Network(10e-6, 2e11)
-RATIOS = {"weak": ("two", "one"), "strong": ("strong", "one"), "of both cores": ("two", "both")}
+RATIOS = {
+    "weak": ("two", "one"),
+    "strong": ("strong", "one"),
+    "of both cores": ("two", "both"),
+    "of the machine": ("apart", "one"),
+    "of two apart": ("two", "apart"),
+}
 
 
 def main() -> None:
@@ -62,6 +70,8 @@ def main() -> None:
         ):
             print(f"{name}: {times * size} simulations, compiling ...", flush=True)
             runs[name] = Run(args, where, times * size, times * minibatch)
+        print(f"apart: twice {size} simulations, compiling ...", flush=True)
+        runs["apart"] = Run(args, two, size, minibatch, joined=False)
         seconds = {name: [] for name in runs}
         for _ in range(args.rounds):
             for name, run in runs.items():
@@ -76,10 +86,15 @@ def main() -> None:
 
 
 class Run:
-    """The processes of one run, on CPUs of their own."""
+    """The processes of one run, on CPUs of their own; or of as many runs, if not joined."""
 
     def __init__(
-        self, args: argparse.Namespace, cpus: list[list[int]], num_envs: int, minibatch: int
+        self,
+        args: argparse.Namespace,
+        cpus: list[list[int]],
+        num_envs: int,
+        minibatch: int,
+        joined: bool = True,
     ) -> None:
         sizes = [f"ppo.num_envs={num_envs}", f"ppo.minibatch_size={minibatch}"]
         setting = {
@@ -90,7 +105,7 @@ class Run:
             "quick": args.quick,
         }
         options: list[str] = []
-        if len(cpus) > 1:
+        if joined and len(cpus) > 1:
             address = f"127.0.0.1:{_free_port()}"
             options = ["--coordinator", address, "--processes", str(len(cpus)), "--process"]
         self._processes = []
@@ -99,6 +114,8 @@ class Run:
             self._processes.append(_started(words, own))
         answers = [self._answer(process) for process in self._processes]
         self.about: dict[str, Any] = answers[0]
+        if not joined:
+            self.about["steps"] = sum(answer["steps"] for answer in answers)
 
     def iterate(self) -> float:
         """Seconds of one iteration: those of the slowest process."""

@@ -43,11 +43,19 @@ def test_ratios_are_of_the_same_round():
     }
     double = {**about, "steps": 20}
     found = scaling.report(
-        {"one": about, "two": double, "strong": about, "both": double},
-        {"one": [1.0, 3.0, 2.0], "two": [1.0, 3.0, 4.0], "strong": [1.0] * 3, "both": [1.0] * 3},
+        {"one": about, "two": double, "strong": about, "both": double, "apart": double},
+        {
+            "one": [1.0, 3.0, 2.0],
+            "two": [1.0, 3.0, 4.0],
+            "strong": [1.0] * 3,
+            "both": [1.0] * 3,
+            "apart": [0.5, 0.5, 1.0],
+        },
     )
     assert found["ratios"]["weak"] == 2.0
     assert found["ratios"]["strong"] == 2.0
+    assert found["ratios"]["of the machine"] == 4.0
+    assert found["ratios"]["of two apart"] == 0.25
     assert found["iteration"] == {
         "compute_s": 2.0,
         "gradient_bytes": 800,
