@@ -67,8 +67,8 @@ def std(x: jax.Array, axes: tuple[int, ...] | None = None) -> jax.Array:
     return jnp.std(x, axes) if size() == 1 else jnp.sqrt(var(x, axes))
 
 
-def added(x: jax.Array, index: tuple[jax.Array, ...], change: jax.Array) -> jax.Array:
-    """`x.at[index].add(change)` with the indices and changes [B] of all devices; x is the same."""
+def added(x: jax.Array, index: tuple[jax.Array | slice, ...], change: jax.Array) -> jax.Array:
+    """`x.at[index].add(change)` with the indices and changes of all devices; x is the same."""
     if size() == 1:
         return x.at[index].add(change)
     return x + summed(jnp.zeros_like(x).at[index].add(change))

@@ -57,8 +57,8 @@ def running_mean(
     index: of the entries [B] that they count in; good [B]: 1, else 0; rate: share of a result in
     its entry's mean.
     """
-    number = device_axis.added(jnp.zeros_like(mean), index, counts.astype(jnp.float32))
-    none = jnp.zeros_like(mean)
-    total = device_axis.added(none, index, (counts & good).astype(jnp.float32))
+    both = jnp.stack([counts, counts & good]).astype(mean.dtype)  # one message for two tables
+    none = jnp.zeros((2, *mean.shape), mean.dtype)
+    number, total = device_axis.added(none, (slice(None), *index), both)
     share = 1.0 - (1.0 - rate) ** number
     return mean + share * (total / jnp.maximum(number, 1.0) - mean)
