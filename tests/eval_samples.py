@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-import jax
 from tiny_task import CONFIG, tiny_task
 
+from compiled import first_policy
 from getup_jax.config import Config, NetworkConfig
 from getup_jax.envs.getup.build import BuiltTask
 from getup_jax.evaluation.rollout import Episodes, run_episodes
@@ -35,7 +35,7 @@ def make_policy(task: BuiltTask, config: Config = SMALL) -> tuple[Learner, Polic
     learner = make_learner(
         task.environment, config.network, config.ppo, total_steps=config.train.total_steps
     )
-    return learner, jax.jit(learner.init_learner)(jax.random.PRNGKey(0)).policy
+    return learner, first_policy(learner)
 
 
 def run(task: BuiltTask, conditions: Scenario, number: int) -> Episodes:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from tiny_task import untrained_prior
 
+from compiled import first_policy
 from eval_samples import SMALL, make_policy, make_task, save_policy
 from getup_jax.config import Config
 from getup_jax.envs.getup.action_decoder import ActionDecoder
@@ -113,7 +114,7 @@ def test_an_action_that_means_the_same_leaves_the_policy_alone(task):
     learner, policy = make_policy(task, CONFIG)
     log: list[str] = []
     teacher = teacher_of(learner, policy, learner.env.decoder(task.world))
-    own = jax.jit(learner.init_learner)(jax.random.PRNGKey(1)).policy
+    own = first_policy(learner, seed=1)
     assert carry_over(learner, task.world, own, teacher, KEY, log.append) is policy
     assert log == []
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from tiny_composite import COMPOSITE, CONFIG, clips, tiny_composite
 
+from compiled import first_policy
 from getup_jax.envs.composite.meta.chain import with_meta
 from getup_jax.envs.composite.reference_state_init import FOLLOWING, Following, clip_starts
 from getup_jax.imitation import dagger
@@ -60,7 +61,7 @@ def test_the_actor_comes_to_name_the_clips_targets(built, monkeypatch):
     monkeypatch.setattr(dagger, "_MINIBATCH", 16)
     monkeypatch.setattr(dagger, "_ROUNDS", 2)
     learner = make_learner(built.environment, CONFIG.network, CONFIG.ppo, total_steps=1000)
-    policy = jax.jit(learner.init_learner)(KEY).policy
+    policy = first_policy(learner)
     row = jnp.arange(8)
     observation = built.environment.start(built.world, row, KEY).observation
     targets = dagger.clip_targets(built)[row, 0, 0]
@@ -116,12 +117,12 @@ def test_over_a_meta_policy_only_the_new_clips_are_learned(built, monkeypatch, t
     monkeypatch.setattr(dagger, "_EPOCHS", 150)
     monkeypatch.setattr("getup_jax.envs.composite.meta.chain.load_clips", lambda *_: built.clips)
     trained = make_learner(built.environment, CONFIG.network, CONFIG.ppo, total_steps=1000)
-    item = {"policy": jax.jit(trained.init_learner)(jax.random.PRNGKey(5)).policy, "prior": None}
+    item = {"policy": first_policy(trained, seed=5), "prior": None}
     meta = str(save_learner(tmp_path / "checkpoints", 1, {"none": np.zeros(1)}, CONFIG, item))
     config = dataclasses.replace(CONFIG, composite=dataclasses.replace(COMPOSITE, meta=meta))
     env, world = with_meta(config, built)
     learner = make_learner(env, CONFIG.network, CONFIG.ppo, total_steps=1000)
-    policy = jax.jit(learner.init_learner)(KEY).policy
+    policy = first_policy(learner)
     new = np.arange(env.action_size) < 10
     row = jnp.arange(8)
     start = built.environment.start(built.world, row, KEY)

@@ -10,6 +10,7 @@ import pytest
 from ground_samples import TERRAIN
 from tiny_task import CONFIG, getups, neutral_prior
 
+from compiled import first_policy
 from getup_jax.config import NetworkConfig, PPOConfig
 from getup_jax.envs.getup.build import assemble
 from getup_jax.envs.getup.resets import region_pool
@@ -48,7 +49,7 @@ def test_the_actor_learns_the_held_poses_and_keeps_the_rest(built, monkeypatch):
     monkeypatch.setattr(action_regression, "_MINIBATCH", 64)
     monkeypatch.setattr(slope_warm_start, "_HELD", 3)
     task, learner = built
-    policy = jax.jit(learner.init_learner)(KEY).policy
+    policy = first_policy(learner)
     log: list[str] = []
     slope_warm_start.warm_start_on_slopes(learner, task.world, policy, KEY, log.append)
     after, before, flat, slope = (float(word) for word in log[-1].split() if word[0].isdigit())

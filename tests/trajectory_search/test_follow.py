@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from compiled import first_policy
 from getup_jax.config import NetworkConfig, PPOConfig
 from getup_jax.envs.getup.drawn_curves import Curve, style_curve
 from getup_jax.evaluation.control_gain import edit_plan
@@ -96,7 +97,7 @@ def test_the_search_follows_a_curve_more_closely_than_a_policy_that_knows_nothin
 def test_the_bound_of_edits(built):
     network = NetworkConfig(hidden_sizes=(8,))
     learner = make_learner(built.environment, network, PPOConfig(), total_steps=1000)
-    policy = jax.jit(learner.init_learner)(jax.random.PRNGKey(0)).policy
+    policy = first_policy(learner)
     seen: list[float] = []
     found = bound(built, learner, policy, edit_plan(built, 1, seed=0), seen.append)
     assert seen == [1, 2, 3, 4]

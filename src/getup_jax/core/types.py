@@ -10,6 +10,7 @@ Units are SI: m, s, kg, N, Nm, rad. World frame: Z up. Quaternions: w x y z.
 
 from __future__ import annotations
 
+import functools
 from types import ModuleType
 from typing import Any, Protocol
 
@@ -96,6 +97,7 @@ def array_module(*arrays: object) -> ModuleType:
     return jnp if any(isinstance(array, jax.Array) for array in arrays) else np
 
 
+@functools.partial(jax.jit, inline=True)  # outside of a program: one for all leaves
 def take(rows: Any, index: jax.Array) -> Any:
     """Rows of a pool pytree: leaves [P, ...] at index[B] give leaves [B, ...]."""
     return jax.tree.map(lambda x: x[index], rows)

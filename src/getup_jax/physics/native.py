@@ -82,7 +82,8 @@ class NativeEngine:
         for first in range(0, len(qpos), size):
             # the last one is filled up, so that one batch serves all of them
             index = np.minimum(np.arange(first, first + size), len(qpos) - 1)
-            placed, keep = batch.place(qpos[index], qvel[index]), len(qpos) - first
+            placed = jax.device_get(batch.place(qpos[index], qvel[index]))
+            keep = len(qpos) - first
             parts.append(jax.tree.map(lambda x, keep=keep: x[:keep], placed))
         return jax.tree.map(lambda *x: jnp.asarray(np.concatenate(x)), *parts)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -180,7 +181,7 @@ def _load_group(name: str, config: GroupConfig, character: CharacterSpec) -> lis
 
 def _check_starts(task: CompositeTask, starts: Starts, key: str) -> None:
     kinematics = starts.physics.kinematics
-    fallen = np.asarray(task.has_fallen(kinematics) | ~kinematics.finite)
+    fallen = np.asarray(jax.jit(task.has_fallen)(kinematics) | ~kinematics.finite)
     if fallen.all():
         raise ConfigError(
             f"{key}: every frame counts as a fall; expected clips on the feet, or a lower "

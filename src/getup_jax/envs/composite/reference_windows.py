@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import jax
@@ -48,19 +49,29 @@ def make_references(
     clips = [repeated(clip, 2) for clip in clips]
     counts = [len(clip.qpos) for clip in clips]
     position, quaternion = link_poses(np.concatenate([clip.qpos for clip in clips]), character)
-    some = np.linspace(0, len(position) - 1, min(_POSES, len(position))).astype(int)
-    pose = group.window(jnp.asarray(position[some, None]), jnp.asarray(quaternion[some, None]))
     found = References(
         position=jnp.asarray(position),
         quaternion=jnp.asarray(quaternion),
         first=jnp.asarray(np.cumsum([0, *counts[:-1]]), jnp.int32),
         fps=jnp.asarray([clip.fps for clip in clips], jnp.float32),
         duration=jnp.asarray([clip.duration for clip in clips], jnp.float32),
-        poses=group.positions(pose)[:, 0],
+        poses=jnp.zeros((0, len(group.links), 3)),
         travel=jnp.zeros(()),
     )
-    windows = sample(found, group, jax.random.PRNGKey(0), _WINDOWS, control_dt)
-    return found.replace(travel=jnp.mean(travel(group, windows)))
+    poses, mean_travel = _statistics(found, group, control_dt)
+    return found.replace(poses=poses, travel=mean_travel)
+
+
+@functools.partial(jax.jit, static_argnums=(1, 2))
+def _statistics(
+    references: References, group: Group, control_dt: float
+) -> tuple[jax.Array, jax.Array]:
+    """Some poses [n, N, 3] of the clips, see `nearest`, and the mean `travel` of windows."""
+    total = len(references.position)
+    some = np.linspace(0, total - 1, min(_POSES, total)).astype(int)
+    pose = group.window(references.position[some, None], references.quaternion[some, None])
+    windows = sample(references, group, jax.random.PRNGKey(0), _WINDOWS, control_dt)
+    return group.positions(pose)[:, 0], jnp.mean(travel(group, windows))
 
 
 def sample(

@@ -11,6 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 from tiny_composite import COMPOSITE, CONFIG, tiny_composite
 
+from compiled import first_policy
 from getup_jax.config import CompositeConfig, ConfigError
 from getup_jax.core import quaternion
 from getup_jax.envs.composite.meta.chain import with_meta
@@ -78,7 +79,7 @@ def test_the_root_is_always_where_it_is(built):
 def test_a_meta_policy_acts_as_if_the_arm_were_its_own(built, arm, tmp_path, monkeypatch):
     monkeypatch.setattr("getup_jax.envs.composite.meta.chain.load_clips", lambda *_: built.clips)
     trained = make_learner(built.environment, CONFIG.network, CONFIG.ppo, total_steps=1000)
-    item = {"policy": jax.jit(trained.init_learner)(jax.random.PRNGKey(5)).policy, "prior": None}
+    item = {"policy": first_policy(trained, seed=5), "prior": None}
     meta = str(save_learner(tmp_path / "checkpoints", 1, {"none": np.zeros(1)}, CONFIG, item))
     groups = dict(COMPOSITE.groups)
     groups["upper"] = dataclasses.replace(groups["upper"], clips=("aim",))
