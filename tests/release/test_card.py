@@ -8,6 +8,7 @@ import pytest
 
 from getup_jax.config import ConfigError
 from getup_jax.core.resources import asset_path
+from getup_jax.release.card import weak_curves
 from getup_jax.release.export import CARD, export
 from getup_jax.runtime.checkpoint import load_policy
 
@@ -63,3 +64,19 @@ def test_an_evaluation_of_another_task_is_refused(tmp_path, result):
     with pytest.raises(ConfigError, match=r"--eval: .*eval\.json: is of another task"):
         export(WALK, tmp_path / "policy", [file])
     assert not (tmp_path / "policy").exists()
+
+
+def test_a_curve_that_fails_is_named_once_with_its_worst_evaluation():
+    def evaluated(**rates: float) -> dict:
+        curves = {name: {"success": rate} for name, rate in rates.items()}
+        return {"conditions": {"start": "lying", "blend": None}, "per_curve": curves}
+
+    lines = weak_curves([evaluated(a=0.9, b=0.5, c=1.0), evaluated(a=0.7, b=0.2, c=0.8)])
+    assert lines == ["Curves that succeed in less than 80%: b (20%), a (70%)."]
+    many = weak_curves([evaluated(**{f"c{i:02}": i / 100 for i in range(30)}, good=1.0)])
+    assert many[0].startswith(
+        "Curves that succeed in less than 80% in one of these evaluations: 30 of 31. The worst: "
+        "c00 (0%), c01 (1%),"
+    )
+    assert many[0].count("%)") == 8
+    assert weak_curves([evaluated(a=0.8)]) == []

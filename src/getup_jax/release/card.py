@@ -12,6 +12,7 @@ from getup_jax.runtime.checkpoint import LoadedPolicy
 from getup_jax.runtime.console import duration
 
 LOW_SUCCESS = 0.8  # curves below this are named as limits
+_NAMED = 8  # curves that a card names as weak
 _UNKNOWN = "unknown"
 
 _CARD = """\
@@ -153,21 +154,27 @@ def _conditions(of: Mapping[str, Any]) -> str:
 
 
 def _limits(loaded: LoadedPolicy, evaluations: Sequence[Mapping[str, Any]]) -> list[str]:
-    weak = {
-        f"{name} ({part['success']:.0%})"
-        for result in evaluations
-        if result["conditions"]["start"] == "lying" and result["conditions"]["blend"] is None
-        for name, part in (result.get("per_curve") or {}).items()
-        if part["success"] < LOW_SUCCESS
-    }
     limits = [
         f"Trained for the character `{loaded.config.physics.character}` on the ground and with "
         "the servos of config.yaml; no other body or machine.",
         "Follows the curves that it was trained on; others need an evaluation first "
         "(`getup-eval --blend`).",
     ]
-    if weak:
-        limits.append(
-            f"Curves that succeed in less than {LOW_SUCCESS:.0%}: {', '.join(sorted(weak))}."
-        )
-    return limits
+    return [*limits, *weak_curves(evaluations)]
+
+
+def weak_curves(evaluations: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A line on the curves that often fail, each with its worst evaluation; or none."""
+    worst: dict[str, float] = {}
+    for result in evaluations:
+        if result["conditions"]["start"] == "lying" and result["conditions"]["blend"] is None:
+            for name, part in (result.get("per_curve") or {}).items():
+                worst[name] = min(part["success"], worst.get(name, 1.0))
+    weak = sorted(((rate, name) for name, rate in worst.items() if rate < LOW_SUCCESS))
+    if not weak:
+        return []
+    some = ", ".join(f"{name} ({rate:.0%})" for rate, name in weak[:_NAMED])
+    which = f"Curves that succeed in less than {LOW_SUCCESS:.0%}"
+    if len(weak) > _NAMED:
+        which += f" in one of these evaluations: {len(weak)} of {len(worst)}. The worst"
+    return [f"{which}: {some}."]
