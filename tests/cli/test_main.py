@@ -71,6 +71,7 @@ def test_the_exit_code_tells_of_a_signal(calls, number, code):
             "ConfigError: ppo.learnig_rate: unknown key; did you mean",
         ),
         (["nothing.yaml"], "ConfigError: nothing.yaml: no such config file; the shipped configs"),
+        (["full"], "ConfigError: full: is a folder; expected a YAML file, or a shipped config's"),
         (["quick", "--run", "full"], "RunError: full: holds a run already; add --resume"),
         (["quick", "--run", "full/file"], "RunError: full/file: is a file"),
     ],

@@ -74,7 +74,7 @@ def test_position_channels_of_an_inner_joint_replace_its_offset(tmp_path):
         ("1.0 2.0 4.0", "1.0 two 4.0", r"line 20, joint Hips Yposition.*'two'"),
         ("1.0 2.0 4.0", "2.0 4.0", r"line 20: expected 9 values, one a channel, got 8"),
         ("Yrotation Xrotation", "Yrotatoin Xrotation", r"line 5: joint Hips.*did you mean Yrot"),
-        ("CHANNELS 3", "CHANNELS 4", r"line 9: joint Spine: CHANNELS says"),
+        ("CHANNELS 3", "CHANNELS 4", r"line 9: joint Spine: CHANNELS says '4', lists 3"),
         ("HIERARCHY", "HIRARCHY", r"line 1: expected HIERARCHY.*not a BVH file"),
         ("MOTION", "", r"expected a MOTION section|expected ROOT"),
         ("\t\t}\n\t}\n}", "\t\t}\n\t}", r"1 braces are still open"),

@@ -56,8 +56,14 @@ REFUSED = {
     "no rows": (BASE.removesuffix(ROWS).replace(f"Frames: {FRAMES}", "Frames: 0"), "at least one"),
     "no rows, though it says some": (BASE.removesuffix(ROWS), "says 10 frames, file has 0 rows"),
     "10^12 frames": (BASE.replace(f"Frames: {FRAMES}", f"Frames: {10**12}"), "file has 10 rows"),
-    "a number past all numbers": (BASE.replace("95.000000", "1e308"), "expected a finite number"),
-    "an underscore in a number": (BASE.replace("95.000000", "9_5"), "finite number, got '9_5'"),
+    "a number past all numbers": (
+        BASE.replace("95.000000", "1e308"),
+        "expected a finite number of at most 1e.09, got",
+    ),
+    "an underscore in a number": (
+        BASE.replace("95.000000", "9_5"),
+        "finite number of at most 1e.09, got '9_5'",
+    ),
     "no channels": (re.sub(r"CHANNELS.*", "CHANNELS 0", BASE), "expected joints with CHANNELS"),
     "a channel twice": (BASE.replace("3 Zrot", "3 Yrot"), r"Spine: twice the channel 'Yrotation'"),
     "no brace": (BASE.replace("{", "", 1), "line 4: expected an opening brace before OFFSET"),

@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import json
 import math
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,7 @@ examples:
 
 _EXIT = "exit code: 0 where every file was used, with warnings or without; 1 where one was not"
 _FASTEST_HZ = 10_000
+_PIPED = 200  # columns of a table that no terminal shows
 _SOURCE = "authored, deepmimic, a folder or a file"
 
 
@@ -150,7 +152,7 @@ def _import(args: argparse.Namespace, character: CharacterSpec) -> int:
     reports = _reports(args, character)
     if args.out:
         _write_clips(args.out, reports, character)
-    console = Console()
+    console = _wide()
     console.print(file_table(reports))
     _print_messages(console, reports)
     if args.json:
@@ -170,9 +172,14 @@ def _write_clips(folder: Path, reports: Sequence[FileReport], character: Charact
             write_npz(folder / f"{name}.npz", clip, report.retarget, character)
 
 
+def _wide() -> Console:
+    """The standard output; a file or a pipe has no width that would cut a table."""
+    return Console() if sys.stdout.isatty() else Console(width=_PIPED)
+
+
 def _events(args: argparse.Namespace, character: CharacterSpec) -> int:
     (report,) = _reports(args, character)
-    console = Console()
+    console = _wide()
     if report.clip:
         console.print(event_table(report, report.clip.fps))
     _print_messages(console, [report])
@@ -181,7 +188,7 @@ def _events(args: argparse.Namespace, character: CharacterSpec) -> int:
 
 def _list(args: argparse.Namespace, character: CharacterSpec) -> int:
     library = load_motions(MotionConfig(source=tuple(args.sources)), character)
-    console = Console()
+    console = _wide()
     console.print(getup_table(library.getups))
     console.print(f"{len(library.poses)} poses for the pose prior, mirror images included")
     return 0

@@ -82,6 +82,9 @@ def find_config(path: str | Path) -> Path:
     for candidate in (Path(path), config_path(path)):
         if candidate.is_file():
             return candidate
+    if str(path) and Path(path).exists():  # a folder, a pipe, a device
+        kind = "a folder" if Path(path).is_dir() else "no regular file"
+        raise ConfigError(f"{path}: is {kind}; expected a YAML file, or a shipped config's name")
     shipped = ", ".join(shipped_configs())
     raise ConfigError(f"{path}: no such config file; the shipped configs are: {shipped}")
 

@@ -72,4 +72,4 @@ def check_name(name: str, known: tuple[str, ...], key: str) -> None:
     if name not in known:
         close = difflib.get_close_matches(name, known, n=1)
         hint = f"; did you mean {close[0]!r}?" if close else ""
-        raise ConfigError(f"{key}: unknown {name!r}{hint} Known: {', '.join(known) or 'none'}")
+        raise ConfigError(f"{key}: unknown {name!r}{hint}; known: {', '.join(known) or 'none'}")

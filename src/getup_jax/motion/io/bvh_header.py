@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.io.text import number, said
+from getup_jax.motion.io.text import FINITE, number, said
 
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 _MOST_LINES = 300_000  # up to MOTION
@@ -66,7 +66,7 @@ def number_of(file: str, line: int, what: str, text: str) -> float:
     value = number(text)
     if value is None:
         got = said(text)
-        raise MotionError(f"{file}, line {line}: {what}: expected a finite number, got {got}")
+        raise MotionError(f"{file}, line {line}: {what}: expected {FINITE}, got {got}")
     return value
 
 
@@ -182,7 +182,8 @@ class _Parser:
             self._stack[-1] = self._moving_end()
         joint = self._joint()
         if not words or words[0] != str(len(names)):
-            self._fail(number, f"joint {joint.name}: CHANNELS says {words[:1]}, lists {len(names)}")
+            says = said(words[0]) if words else "no number"
+            self._fail(number, f"joint {joint.name}: CHANNELS says {says}, lists {len(names)}")
         for name in names:
             if name not in CHANNELS or names.count(name) > 1:
                 close = difflib.get_close_matches(name, set(CHANNELS) - set(names), n=1)

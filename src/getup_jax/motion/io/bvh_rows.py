@@ -10,7 +10,7 @@ import numpy as np
 
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.io.bvh_header import Joint, number_of, without_comment
-from getup_jax.motion.io.text import LARGEST, number, said
+from getup_jax.motion.io.text import FINITE, LARGEST, number, said
 
 OFF_BY_ONE = 1  # rows that a writer may forget: a file that lacks more has lost a part
 FRAME_S = (1e-4, 1.0)  # shortest and longest frame that anything has recorded
@@ -205,7 +205,7 @@ def _damage(file: str, names: Sequence[str], rows: Sequence[Row]) -> MotionError
         for name, word in zip(names, row.text.split(), strict=True):
             if number(word) is None:
                 return MotionError(
-                    f"{file}, line {row.line}, joint {name}: expected a finite number, got "
+                    f"{file}, line {row.line}, joint {name}: expected {FINITE}, got "
                     f"{said(word)}; mend or remove that frame"
                 )
     return MotionError(f"{file}: expected finite numbers in every row")

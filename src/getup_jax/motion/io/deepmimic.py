@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.io.bvh import Y_UP
 from getup_jax.motion.io.recording import Recording, at_times, even_times, turned
-from getup_jax.motion.io.text import LARGEST, read_json
+from getup_jax.motion.io.text import FINITE, LARGEST, read_json
 
 COLUMNS = 44
 _DURATION_S = (1e-4, 10.0)  # of a frame, but for the last
@@ -73,7 +73,7 @@ def _numbers(path: Path, rows: list[list[Any]]) -> np.ndarray:
             real = isinstance(value, int | float) and not isinstance(value, bool)
             if not real or not abs(value) <= LARGEST:
                 raise MotionError(
-                    f"{path.name}, frame {number}, column {column}: expected a finite number, "
+                    f"{path.name}, frame {number}, column {column}: expected {FINITE}, "
                     f"got {reprlib.repr(value)}"
                 )
     return np.array(rows, np.float64)

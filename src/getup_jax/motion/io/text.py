@@ -106,6 +106,10 @@ def number(text: str) -> float | None:
     return value if abs(value) <= LARGEST else None
 
 
+# what a message expects where `number` gives none
+FINITE = f"a finite number of at most {LARGEST:g}"
+
+
 def said(text: str) -> str:
     """A word as a message shows it, with a hint where its decimals have a comma."""
     hint = "; decimals take a point, not a comma" if _COMMA.fullmatch(text) else ""
