@@ -62,16 +62,15 @@ def main() -> None:
     one, two = [[cpus[0]]], [[cpus[0]], [cpus[1]]]
     runs: dict[str, Run] = {}
     try:
-        for name, where, times in (
-            ("one", one, 1),
-            ("two", two, 2),
-            ("strong", two, 1),
-            ("both", [cpus[:2]], 2),
+        for name, where, times, joined in (
+            ("one", one, 1, True),
+            ("two", two, 2, True),
+            ("strong", two, 1, True),
+            ("both", [cpus[:2]], 2, True),
+            ("apart", two, 1, False),
         ):
             print(f"{name}: {times * size} simulations, compiling ...", flush=True)
-            runs[name] = Run(args, where, times * size, times * minibatch)
-        print(f"apart: twice {size} simulations, compiling ...", flush=True)
-        runs["apart"] = Run(args, two, size, minibatch, joined=False)
+            runs[name] = Run(args, where, times * size, times * minibatch, joined)
         seconds = {name: [] for name in runs}
         for _ in range(args.rounds):
             for name, run in runs.items():
@@ -94,7 +93,7 @@ class Run:
         cpus: list[list[int]],
         num_envs: int,
         minibatch: int,
-        joined: bool = True,
+        joined: bool,
     ) -> None:
         sizes = [f"ppo.num_envs={num_envs}", f"ppo.minibatch_size={minibatch}"]
         setting = {

@@ -97,7 +97,7 @@ def test_a_message_that_makes_no_sense_is_answered_with_a_reason(site, message, 
         ({"curve": {**CURVE, "height": [0] * 10_000}}, "height: expected numbers"),
         (
             {"type": "export", "format": "exe"},
-            "format: expected one of glb, usd, bvh",
+            "format: expected one of glb, usd, bvh, npz, csv, mp4",
         ),
         ({"type": "load", "name": "a.yaml", "text": "x"}, "a.yaml: expected the keys"),
         ({"type": "load", "name": "a/b.yaml"}, "name: expected the name of a file"),

@@ -82,10 +82,9 @@ class NativeEngine:
         for first in range(0, len(qpos), size):
             # the last one is filled up, so that one batch serves all of them
             index = np.minimum(np.arange(first, first + size), len(qpos) - 1)
-            placed = jax.device_get(batch.place(qpos[index], qvel[index]))
-            keep = len(qpos) - first
+            placed, keep = batch.place(qpos[index], qvel[index]), len(qpos) - first
             parts.append(jax.tree.map(lambda x, keep=keep: x[:keep], placed))
-        return jax.tree.map(lambda *x: jnp.asarray(np.concatenate(x)), *parts)
+        return jax.device_put(jax.tree.map(lambda *x: np.concatenate(x), *parts))
 
     def step(
         self,
