@@ -9,6 +9,8 @@ from getup_jax.config import Config, ConfigError
 from getup_jax.config.convert import section
 from getup_jax.config.load import dump_yaml, load_config, to_dict
 
+EPOCHS = "expected a whole number (int) from 1 to 1000"
+
 
 @pytest.fixture
 def write(tmp_path):
@@ -38,7 +40,7 @@ def test_overrides_win_over_the_file_and_later_over_earlier(write):
     assert (config.ppo.epochs, config.ppo.clip) == (9, 0.3)
 
 
-@pytest.mark.parametrize("text", ["", "# nothing but a comment\n", "ppo:\n"])
+@pytest.mark.parametrize("text", ["", "# nothing but a comment\n", "ppo: {}\n"])
 def test_empty_files_and_sections_are_no_difference(write, text):
     assert load_config(write(text)) == Config()
 
@@ -83,11 +85,15 @@ def test_numbers_that_yaml_takes_for_text_convert_in_files_too(write):
         ("ppo.learnig_rate=1", "ppo.learnig_rate: unknown key; did you mean 'learning_rate'?"),
         ("pppo.epochs=1", "pppo: unknown key; did you mean 'ppo'?"),
         ("zzz=1", "zzz: unknown key; known keys are: seed, physics, "),
-        ("ppo.epochs=many", "ppo.epochs: expected a whole number (int), got 'many' (str)"),
-        ("ppo.epochs=1.5", "ppo.epochs: expected a whole number (int), got 1.5 (float)"),
-        ("ppo.epochs=true", "ppo.epochs: expected a whole number (int), got True (bool)"),
-        ("ppo.epochs=", "ppo.epochs: expected a whole number (int), got None (NoneType)"),
-        ("ppo.clip=.nan", "ppo.clip: expected a number (float), got nan (float)"),
+        ("ppo.epochs=many", f"ppo.epochs: {EPOCHS}, got 'many' (str)"),
+        ("ppo.epochs=1.5", f"ppo.epochs: {EPOCHS}, got 1.5 (float)"),
+        ("ppo.epochs=true", f"ppo.epochs: {EPOCHS}, got True (bool)"),
+        ("ppo.epochs=", f"ppo.epochs: {EPOCHS}, got None (NoneType)"),
+        ("ppo.clip=.nan", "expected a number (float) more than 0 and at most 10, got nan (float)"),
+        (
+            f"ppo.clip={10**400}",
+            "and at most 10, got a number of over 308 digits (int)",
+        ),
         ("ppo.popart=1", "ppo.popart: expected true or false (bool), got 1 (int)"),
         (
             "network.hidden_sizes=64",
@@ -95,7 +101,8 @@ def test_numbers_that_yaml_takes_for_text_convert_in_files_too(write):
         ),
         ("network.hidden_sizes=[64, x]", "network.hidden_sizes[1]: expected a whole number (int)"),
         ("ppo=3", "ppo: expected a mapping of settings, got 3 (int)"),
-        ("seed.x=3", "seed: expected a whole number (int), got {'x': 3} (dict)"),
+        ("ppo=null", "ppo: expected a mapping of settings, got None (NoneType); leave it out"),
+        ("seed.x=3", "seed: expected a whole number (int) from 0 to 4294967295, got {'x': 3}"),
         ("ppo.minibatch_size=1000", "ppo.minibatch_size: expected a divisor"),
         (
             "ppo.std_scale=[1.0, 0.4]",
@@ -123,6 +130,7 @@ def test_the_suggestion_is_the_whole_message():
     [
         ("seed: 1\nppo: }\n", "run.yaml, line 2: broken YAML"),
         ("seed: 1\nseed: 2\n", "run.yaml, line 2: broken YAML: the key 'seed' appears twice"),
+        ("ppo:\n", "ppo: expected a mapping of settings, got None (NoneType); leave it out for"),
         ("- 1\n", "run.yaml: expected a mapping of settings, got [1] (list)"),
         (b"\xff\xfe\x00", "run.yaml: broken YAML: not text: truncated data (0x00 at position 2)"),
         (
@@ -151,8 +159,14 @@ def test_an_error_of_an_override_does_not_blame_the_file(write):
 
 
 def test_a_missing_file_lists_the_shipped_configs():
-    with pytest.raises(ConfigError, match=r"no/such.yaml: no such config.*flat.*quick"):
+    with pytest.raises(ConfigError, match=r"no/such.yaml: no such config file; the .*flat.*quick"):
         load_config("no/such.yaml")
+
+
+@pytest.mark.parametrize("name", ["flat.yam", "configs/flt.yaml", "Flat"])
+def test_a_missing_file_with_almost_a_shipped_name_suggests_it(name):
+    with pytest.raises(ConfigError, match=r"no such config file; did you mean 'flat'\? the "):
+        load_config(name)
 
 
 def test_shipped_configs_are_found_from_anywhere(tmp_path, monkeypatch):

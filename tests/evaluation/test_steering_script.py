@@ -37,8 +37,8 @@ def test_commands_come_in_the_order_of_their_times_with_defaults(tmp_path):
     ("text", "message"),
     [
         ("[1, 2]", "expected a file with duration_s and a list of commands"),
-        ("a: [", "line 1: not YAML"),
-        ("[" * 5000, "line 1: not YAML: nested more than 40 deep"),
+        ("a: [", "line 1: broken YAML"),
+        ("[" * 5000, "line 1: broken YAML: nested more than 40 deep"),
         ("duration_s: .inf\ncommands: [{at_s: 0, policy: x}]", "duration_s: .*, got inf"),
         (f"duration_s: {'9' * 400}\ncommands: [{{at_s: 0, policy: x}}]", "a number of over 308"),
         ("duration_s: 5\ncommands: []", "commands: expected at least one"),

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 from motion_samples import SUPINE, getup_clip
@@ -53,7 +54,11 @@ def test_a_bad_file_is_reported_and_the_others_go_on(rise, tmp_path, capsys):
     assert "bad.bvh" in bad["errors"][0]
     assert bad["frames"] == 0
     assert good["frames"] == 48
-    assert "error: bad.bvh" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "error: bad.bvh" in said.out
+    done = re.findall(r"^(\d)/2 (\w+)\.bvh$", said.err, re.MULTILINE)  # as each is done
+    assert [count for count, _ in done] == ["1", "2"]
+    assert {name for _, name in done} == {"bad", "rise"}
 
 
 def test_a_file_that_lacks_one_row_is_used_and_reported(rise, tmp_path, capsys):
@@ -93,6 +98,21 @@ def test_a_clip_that_never_lies_is_warned_about(tmp_path, character, cache, caps
     write_bvh(record(clip, character), tmp_path / "stand.bvh")
     assert main(["import", str(tmp_path / "stand.bvh")]) == 0
     assert "no get-up found: it never lies" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["import", "--json", "none/report.json"],
+        ["import", "--json", "report.txt"],
+        ["plot", "--out", "none/curves.png"],
+    ],
+)
+def test_a_file_that_cannot_be_written_is_refused_before_the_work(rise, words, capsys):
+    with pytest.raises(SystemExit):
+        main([words[0], str(rise), *words[1:]])
+    said = capsys.readouterr().err
+    assert "no folder none" in said or "that ends in .json" in said
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import re
 
+import mujoco
 import pytest
 
 from getup_jax.config import ConfigError, PhysicsConfig
@@ -71,3 +72,15 @@ def test_all_that_is_missing_is_listed_at_once(tmp_path):
     for name in ("body 'foot_l'", "body 'hand_l'", "body 'hand_r'", "geom 'foot_l' (a box)"):
         assert name in str(caught.value)
     assert "docs/character.md" in str(caught.value)
+
+
+@pytest.mark.parametrize(("by", "text"), [(-0.1, "at -0.10 m; raise"), (0.2, "at 0.20 m; lower")])
+def test_a_keyframe_that_does_not_stand_on_the_floor_is_warned_about(tmp_path, character, by, text):
+    x, y, z, *rest = character.neutral_qpos
+    file = tmp_path / "sunk.xml"
+    spec = mujoco.MjSpec.from_string(OWN)
+    spec.key("neutral").qpos = [x, y, z + by, *rest]
+    spec.compile()
+    file.write_text(spec.to_xml())
+    with pytest.warns(UserWarning, match=f"'neutral': expected both soles on z = 0, .* {text}"):
+        load_character(PhysicsConfig(character=str(file)))

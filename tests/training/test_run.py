@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 from flax import struct
 
-from getup_jax.config import Config, ConfigError
+from getup_jax.config import Config, ConfigError, PhysicsConfig
 from getup_jax.config.load import load_config
+from getup_jax.physics.body_digest import body_digest
+from getup_jax.physics.character import load_character
 from getup_jax.runtime import checkpoint, run_folder
 from getup_jax.runtime.console import Display
 from getup_jax.runtime.metric_file import read_metrics
@@ -242,21 +244,39 @@ def test_only_a_run_has_a_learner_to_go_on_with(tmp_path, unbroken):
         train(tmp_path / "run", 1, "train.init_learner=true")
 
 
-def test_a_checkpoint_remembers_the_body_and_runs_say_where_it_is_another(tmp_path, capsys):
+def warnings_in(capsys):
+    return [line for line in capsys.readouterr().out.splitlines() if "warning" in line]
+
+
+def test_a_checkpoint_remembers_the_body_and_a_resumed_run_says_where_it_is_another(
+    tmp_path, capsys
+):
     body, heavier = {"masses": "a", "servos": "b"}, {"masses": "c", "servos": "b"}
+    run(settings(1), tmp_path, quiet=False, build=builder(body=body))
+    assert checkpoint.load_policy(tmp_path).metadata["body"] == body
+    assert not warnings_in(capsys)
+    run(settings(2), tmp_path, True, False, builder(body=heavier))
+    (line,) = warnings_in(capsys)
+    assert "was trained on a body with other masses; " in line
+
+
+def test_another_body_than_that_of_the_policy_to_begin_with_is_said_before_building(
+    tmp_path, capsys
+):
+    def unbuilt(config, log):
+        raise TrainingError("nothing is built here")
+
     first = tmp_path / "first"
-    run(settings(1), first, quiet=False, build=builder(body=body))
-    assert checkpoint.load_policy(first).metadata["body"] == body
-    begin = settings(1, f"train.init_from={first}")
-    run(begin, tmp_path / "same", quiet=False, build=builder(body=body))
-    assert "warning" not in capsys.readouterr().out
-    run(begin, tmp_path / "other", quiet=False, build=builder(body=heavier))
-    warning = "was trained on a body with other masses; "
-    (line,) = [x for x in capsys.readouterr().out.splitlines() if "warning" in x]
-    assert warning in line
-    run(settings(2), first, True, False, builder(body=heavier))
-    (line,) = [x for x in capsys.readouterr().out.splitlines() if "warning" in x]
-    assert warning in line
+    run(settings(1), first, build=builder(body=body_digest(load_character(PhysicsConfig()).model)))
+    begin = f"train.init_from={first}"
+    run(settings(1, begin), tmp_path / "same", build=builder())
+    assert not warnings_in(capsys)
+    with pytest.raises(TrainingError):
+        run(settings(1, begin, "physics.gain_scale=2"), tmp_path / "other", build=unbuilt)
+    (line,) = warnings_in(capsys)
+    assert "was trained on a body with other servos; " in line
+    with pytest.raises(CheckpointError, match="none: no such folder"):
+        run(settings(1, f"train.init_from={tmp_path}/none"), tmp_path / "no", build=unbuilt)
 
 
 # --- the run folder

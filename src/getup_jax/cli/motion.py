@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from getup_jax.cli.motion_report import FileReport, event_table, file_table, getup_table, report_of
 from getup_jax.config import MotionConfig, PhysicsConfig
@@ -63,13 +63,14 @@ def _parser() -> argparse.ArgumentParser:
     load = _command(commands, "import", _import, "read and retarget motion files")
     load.add_argument("paths", nargs="+", type=Path, metavar="FILE|FOLDER")
     load.add_argument("--out", type=Path, help="folder for the clips (.npz); none: only a check")
-    load.add_argument("--json", type=Path, help="write the report as JSON")
+    load.add_argument("--json", type=output(".json"), help="write the report as JSON")
     _add_reading(load)
     show = _command(commands, "list", _list, "the get-ups of motion sources")
     show.add_argument("sources", nargs="*", default=["authored"], metavar="SOURCE", help=_SOURCE)
     plot = _command(commands, "plot", _plot, "draw the style curves of motion sources")
     plot.add_argument("sources", nargs="+", metavar="SOURCE", help=_SOURCE)
-    plot.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture")
+    picture = output(".png", ".pdf", ".svg")
+    plot.add_argument("--out", type=picture, required=True, metavar="PNG", help="the picture")
     plot.add_argument("--curves", nargs="*", default=[], metavar="NAME", help="only these get-ups")
     plot.add_argument(
         "--strategies", action="store_true", help="only mean and deviation of each strategy"
@@ -223,10 +224,18 @@ def _scene(args: argparse.Namespace, character: CharacterSpec) -> int:
 def _reports(args: argparse.Namespace, character: CharacterSpec) -> list[FileReport]:
     files = [file for path in args.paths for file in _expand(path)]
     console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, TimeElapsedColumn(), console=console) as progress:
-        task = progress.add_task("retargeting", total=len(files))
-        results = _retarget(args, files, character, lambda path: progress.advance(task))
+    left = TimeRemainingColumn(elapsed_when_finished=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), left)
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("retargeting", total=len(files))
+
+        def done(path: Path) -> None:
+            bar.advance(task)
+            if not console.is_terminal and len(files) > 1:  # a log has no bar
+                count = f"{int(bar.tasks[0].completed)}/{len(files)}"
+                print(f"{count} {path.name}", file=sys.stderr, flush=True)
+
+        results = _retarget(args, files, character, done)
     return [report_of(file, results[file], character) for file in files]
 
 

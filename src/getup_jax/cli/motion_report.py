@@ -58,8 +58,7 @@ def report_of(path: Path, result: Result, character: CharacterSpec) -> FileRepor
         heights = heights_of(link_positions(clip, character), character)
         lying = lies(heights, DEFAULTS).any()
         reason = "it lies but does not stand up" if lying else "it never lies"
-        hint = "; if its vertical axis is z, give --up z" if path.suffix.lower() == ".bvh" else ""
-        warnings.append(f"no get-up found: {reason}{hint}")
+        warnings.append(f"no get-up found: {reason}")
     plain = tuple(
         {
             "start": event.lie_start,

@@ -12,7 +12,7 @@ from typing import Any
 
 from getup_jax.config import ConfigError
 from getup_jax.config.check import shown
-from getup_jax.config.ranges import check_values, field_types
+from getup_jax.config.ranges import Range, check_values, field_types, range_of
 
 _LONGEST = 80  # letters that an error text shows of an unknown key
 _EXPECTED = {
@@ -36,9 +36,9 @@ class Text:
 
 def section(value: Any, cls: type, key: str, default: Any) -> Any:
     """A config dataclass: `default` (None: the class's defaults) changed by a mapping."""
-    value = {} if value is None else value
     if not isinstance(value, Mapping):
-        raise ConfigError(f"{key}: expected a mapping of settings, got {describe(value)}")
+        hint = "; leave it out for its defaults" if value is None else ""
+        raise ConfigError(f"{key}: expected a mapping of settings, got {describe(value)}{hint}")
     fields = {f.name: f for f in dataclasses.fields(cls)}
     hints = field_types(cls)
     known = {name: _default(field, default) for name, field in fields.items()}
@@ -47,7 +47,7 @@ def section(value: Any, cls: type, key: str, default: Any) -> Any:
         inner = f"{key}.{name}" if key else str(name)
         if name not in fields:
             raise ConfigError(f"{_cut(inner)}: unknown key; {_suggest(name, fields)}")
-        changed[name] = _convert(item, hints[name], inner, known[name])
+        changed[name] = _convert(item, hints[name], inner, known[name], range_of(fields[name]))
     check_values(cls, changed, key)
     values = known | changed
     for name, item in values.items():
@@ -73,27 +73,30 @@ def _suggest(name: object, known: Mapping[str, Any]) -> str:
     return f"did you mean {close[0]!r}?" if close else f"known keys are: {', '.join(known)}"
 
 
-def _convert(value: Any, hint: Any, key: str, default: Any) -> Any:
-    """`value` as the annotation `hint` asks, or ConfigError naming `key`."""
+def _convert(value: Any, hint: Any, key: str, default: Any, allowed: Range | None) -> Any:
+    """`value` as the annotation `hint` asks, or ConfigError naming `key`; the error says `allowed`.
+
+    Whether numbers are in that range is checked later, of all at once.
+    """
     origin, args = typing.get_origin(hint), typing.get_args(hint)
     if origin in (typing.Union, types.UnionType):
         if value is None:
             return None
         (inner,) = (arg for arg in args if arg is not types.NoneType)
-        return _convert(value, inner, key, default)
+        return _convert(value, inner, key, default, allowed)
     if hint is Any:  # checked by whoever reads it
         return value.value if isinstance(value, Text) else value
     if dataclasses.is_dataclass(hint):
         same = default if isinstance(default, typing.cast(type, hint)) else None
         return section(value, typing.cast(type, hint), key, same)
     if origin is tuple:
-        return _tuple(value, args, key)
+        return _tuple(value, args, key, allowed)
     if origin is dict:
-        return _dict(value, args[1], key)
-    return _scalar(value, hint, key)
+        return _dict(value, args[1], key, allowed)
+    return _scalar(value, hint, key, allowed)
 
 
-def _tuple(value: Any, args: tuple[Any, ...], key: str) -> tuple[Any, ...]:
+def _tuple(value: Any, args: tuple[Any, ...], key: str, allowed: Range | None) -> tuple[Any, ...]:
     if not isinstance(value, list | tuple):
         raise ConfigError(
             f"{key}: expected a list, got {describe(value)}; write {key}=[{shown(value)}]"
@@ -102,16 +105,17 @@ def _tuple(value: Any, args: tuple[Any, ...], key: str) -> tuple[Any, ...]:
     if len(value) != len(hints):
         raise ConfigError(f"{key}: expected {len(hints)} values, got {len(value)}: {shown(value)}")
     pairs = enumerate(zip(value, hints, strict=True))
-    return tuple(_convert(item, hint, f"{key}[{i}]", None) for i, (item, hint) in pairs)
+    return tuple(_convert(item, hint, f"{key}[{i}]", None, allowed) for i, (item, hint) in pairs)
 
 
-def _dict(value: Any, hint: Any, key: str) -> dict[str, Any]:
+def _dict(value: Any, hint: Any, key: str, allowed: Range | None) -> dict[str, Any]:
     if not isinstance(value, Mapping):
         raise ConfigError(f"{key}: expected a mapping, got {describe(value)}")
-    return {str(n): _convert(item, hint, f"{key}.{n}", None) for n, item in value.items()}
+    items = value.items()
+    return {str(n): _convert(item, hint, f"{key}.{n}", None, allowed) for n, item in items}
 
 
-def _scalar(value: Any, hint: Any, key: str) -> Any:
+def _scalar(value: Any, hint: Any, key: str, allowed: Range | None) -> Any:
     if isinstance(value, Text):
         # `character=007` and `engine=off` are text where the field is text.
         value = value.text if hint is str and not isinstance(value.value, str) else value.value
@@ -120,7 +124,8 @@ def _scalar(value: Any, hint: Any, key: str) -> Any:
     if hint in (int, float) and (number := _number(value, hint)) is not None:
         return number
     quotes = "; put it in quotes" if hint is str and value is not None else ""
-    raise ConfigError(f"{key}: expected {_EXPECTED[hint]}, got {describe(value)}{quotes}")
+    expected = _EXPECTED[hint] if allowed is None else f"{_EXPECTED[hint]} {allowed}"
+    raise ConfigError(f"{key}: expected {expected}, got {describe(value)}{quotes}")
 
 
 def _number(value: Any, kind: type) -> int | float | None:

@@ -8,6 +8,7 @@ it as text.
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import functools
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,15 +24,6 @@ from getup_jax.core.resources import config_path, shipped_configs
 
 BASE = "base"  # the key by which a file names another one that it changes
 _DEEPEST = 10  # names in the key of an override
-
-
-class BrokenFileError(ConfigError):
-    """A config file is not YAML; `problem` is the text without the file's name."""
-
-    def __init__(self, file: Path, error: yaml_text.YamlError) -> None:
-        place = "" if error.line is None else f", line {error.line}"
-        self.problem = f"broken YAML: {error}"
-        super().__init__(f"{file}{place}: {self.problem}")
 
 
 def load_config(path: str | Path | None, overrides: Sequence[str] = ()) -> Config:
@@ -85,8 +77,12 @@ def find_config(path: str | Path) -> Path:
     if str(path) and Path(path).exists():  # a folder, a pipe, a device
         kind = "a folder" if Path(path).is_dir() else "no regular file"
         raise ConfigError(f"{path}: is {kind}; expected a YAML file, or a shipped config's name")
-    shipped = ", ".join(shipped_configs())
-    raise ConfigError(f"{path}: no such config file; the shipped configs are: {shipped}")
+    shipped = shipped_configs()
+    close = difflib.get_close_matches(Path(path).stem, shipped, n=1)
+    hint = f"did you mean {close[0]!r}? " if close else ""
+    raise ConfigError(
+        f"{path}: no such config file; {hint}the shipped configs are: {', '.join(shipped)}"
+    )
 
 
 def _plain(value: Any) -> Any:
@@ -101,12 +97,7 @@ def _plain(value: Any) -> Any:
 
 def _read_yaml(file: Path) -> dict[str, Any]:
     """The mapping in a YAML file; an empty file is an empty mapping."""
-    try:
-        values = yaml_text.parse(file.read_bytes())
-    except OSError as error:
-        raise ConfigError(f"{file}: cannot be read: {error.strerror or error}") from None
-    except yaml_text.YamlError as error:
-        raise BrokenFileError(file, error) from None
+    values = yaml_text.read(file)
     if values is None:
         return {}
     if not isinstance(values, dict):

@@ -27,6 +27,15 @@ class YamlError(ValueError):
         self.line = line
 
 
+class BrokenFileError(ConfigError):
+    """A file is not YAML; `problem` is the text without the file's name."""
+
+    def __init__(self, file: Path, error: YamlError) -> None:
+        place = "" if error.line is None else f", line {error.line}"
+        self.problem = f"broken YAML: {error}"
+        super().__init__(f"{file}{place}: {self.problem}")
+
+
 def read(path: Path) -> Any:
     """The value in a YAML file; ConfigError says why there is none, and in which line."""
     try:
@@ -34,8 +43,7 @@ def read(path: Path) -> Any:
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
     except YamlError as error:
-        place = "" if error.line is None else f", line {error.line}"
-        raise ConfigError(f"{path}{place}: not YAML: {error}") from None
+        raise BrokenFileError(path, error) from None
 
 
 def parse(text: str | bytes) -> Any:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import mujoco
+import numpy as np
 
 from getup_jax.config import ConfigError
 
@@ -24,6 +26,7 @@ GEOMS: dict[str, mujoco.mjtGeom | None] = {
 }
 _KINDS = {_SPHERE: "a sphere", _BOX: "a box", _CAPSULE: "a capsule", None: "of any kind"}
 _SHOWN = 12  # names in a message
+_SOLE_GAP_M = 0.03  # between a sole and the floor in the keyframe
 
 
 def hinges_of(model: mujoco.MjModel) -> list[int]:
@@ -54,6 +57,25 @@ def check_character(model: mujoco.MjModel, name: str) -> None:
                 f"{where}: joint {joint!r} of body {link!r}: expected the name {expected}; see "
                 "docs/character.md"
             )
+    _warn_of_soles(model, where)
+
+
+def _warn_of_soles(model: mujoco.MjModel, where: str) -> None:
+    """The keyframe `neutral` stands on z = 0: starts, curves and heights count from there."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = model.key("neutral").qpos
+    mujoco.mj_kinematics(model, data)
+    for name in (f"foot_{side}" for side in _SIDES):
+        geom = model.geom(name).id
+        reach = np.abs(data.geom_xmat[geom].reshape(3, 3)[2]) @ model.geom_size[geom]
+        sole = data.geom_xpos[geom, 2] - reach
+        if abs(sole) > _SOLE_GAP_M:
+            warnings.warn(
+                f"{where}: keyframe 'neutral': expected both soles on z = 0, got {name!r} at "
+                f"{sole:.2f} m; {'raise' if sole < 0 else 'lower'} the root there",
+                stacklevel=4,
+            )
+            return
 
 
 def _check_layout(model: mujoco.MjModel, where: str) -> None:

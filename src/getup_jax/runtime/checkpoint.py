@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from getup_jax.config import Config, ConfigError
-from getup_jax.config.load import BrokenFileError, dump_yaml, load_saved_config
+from getup_jax.config.load import dump_yaml, load_saved_config
+from getup_jax.config.yaml_text import BrokenFileError
 from getup_jax.core.resources import asset_path
 from getup_jax.runtime import hub, integrity, processes
 from getup_jax.runtime.integrity import DamagedError

@@ -110,7 +110,6 @@ class Loop:
     def _load_policy(self, path: str) -> None:
         loaded = checkpoint.load_policy(path)
         self._display.log(f"starting with the policy of {loaded.path}")
-        warn_if_other(loaded.path, loaded.metadata, self._job.body, self._display.log)
         if self._config.train.init_learner:
             self._load_learner(path)
         policy = self._state.learner.policy  # fresh, or not the average of its weights

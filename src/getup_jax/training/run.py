@@ -16,6 +16,7 @@ import numpy as np
 from getup_jax.config import Config
 from getup_jax.envs.composite.build import BuiltComposite, build_composite
 from getup_jax.envs.composite.discriminator_rewards import make_discriminator_rewards
+from getup_jax.envs.composite.goals import equipment_of
 from getup_jax.envs.composite.meta.chain import with_meta
 from getup_jax.envs.composite.meta.meta_policy import MetaTask
 from getup_jax.envs.getup.build import build_task
@@ -24,7 +25,8 @@ from getup_jax.envs.getup.task import World
 from getup_jax.imitation import action_distillation
 from getup_jax.imitation.dagger import Setup, warm_start
 from getup_jax.imitation.slope_warm_start import warm_start_on_slopes
-from getup_jax.physics.body_digest import body_digest
+from getup_jax.physics.body_digest import body_digest, warn_if_other
+from getup_jax.physics.character import load_character
 from getup_jax.rl.learner import Learner, make_learner
 from getup_jax.rl.state import PolicyState
 from getup_jax.runtime import checkpoint, processes
@@ -147,8 +149,11 @@ def run(
         if _finished(folder, config):
             display.log(f"{folder} has all of its {count(total)} steps; raise train.total_steps")
             return None
+        # what is wrong is said now rather than after minutes of compiling
         if config.train.tensorboard:
-            tensorboard_module()  # fail now rather than after minutes of compiling
+            tensorboard_module()
+        if not checkpoint.steps(folder / checkpoint.CHECKPOINTS):
+            _check_start(config, display.log)
         wandb = _wandb(folder, config)
         begin = time.monotonic()
         display.log(f"building the task ({described()}) ...")
@@ -172,6 +177,16 @@ def _writer(folder: Path, loop: Loop, config: Config, wandb: WandbLog | None) ->
     if processes.is_first():
         return MetricsWriter(folder, loop.done, config.train.tensorboard, wandb)
     return contextlib.nullcontext(NoMetrics())
+
+
+def _check_start(config: Config, log: Log) -> None:
+    """Read the policy that the run begins with, if any, and say if it knows another body."""
+    if config.train.init_from is None:
+        return
+    start = checkpoint.load_policy(config.train.init_from)
+    held = None if config.composite is None else equipment_of(config.composite.goals)
+    body = body_digest(load_character(config.physics, equipment=held).model)
+    warn_if_other(start.path, start.metadata, body, log)
 
 
 def _finished(folder: Path, config: Config) -> bool:

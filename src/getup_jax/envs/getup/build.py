@@ -15,6 +15,7 @@ from getup_jax.core.resources import asset_path, cache_dir
 from getup_jax.envs.getup import user_rewards
 from getup_jax.envs.getup.curriculum.curriculum import Curriculum
 from getup_jax.envs.getup.observation import Observer
+from getup_jax.envs.getup.resets import archived_states
 from getup_jax.envs.getup.resets.lying_bodies import LimpBodies
 from getup_jax.envs.getup.resets.pool import FlatStarts, build_pool
 from getup_jax.envs.getup.resets.region_pool import Site, build_region_pool
@@ -56,6 +57,8 @@ def build_task(
 
     choose: makes the styles out of those of the library; None: all of these.
     """
+    user_rewards.check(config.task.rewards, RESERVED)
+    archived_states.check(config.training_aids.archive)
     character = load_character(config.physics)
     log(f"motions: {', '.join(config.motion.source)}")
     library = load_motions(config.motion, character)
@@ -109,7 +112,6 @@ def assemble(
     log: Callable[[str], None],
 ) -> BuiltTask:
     """The task from its finished parts; `character` stands on a plane."""
-    user_rewards.check(config.task.rewards, RESERVED)
     site = None if config.terrain is None else _site(config, config.terrain)
     on_ground = character if site is None else site.character
     task = make_task(config, character, on_ground, prior)

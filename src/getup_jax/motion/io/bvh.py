@@ -50,19 +50,21 @@ def read_bvh(path: str | Path, options: BvhOptions = BvhOptions()) -> Recording:
         )
     rows, warnings = read_rows(path.name, joints, timing, lines, options.allow_short)
     raw = _decode(path, joints, rows, 1.0 / timing.frame_time).warn(*warnings)
-    recording = turned(raw, Y_UP) if _up(raw, options.up) == "y" else raw
-    return scaled(recording, options.metres or 1.0)
+    return scaled(_upright(raw, options.up), options.metres or 1.0)
 
 
-def _up(raw: Recording, asked: str) -> str:
-    """y or z: as asked for, else as the file shows."""
-    up = (vertical_axis(raw) or "y") if asked == "auto" else asked
+def _upright(raw: Recording, asked: str) -> Recording:
+    """The recording with z up; its vertical axis is y or z as asked for, else as the file shows."""
+    up = vertical_axis(raw) if asked == "auto" else asked
+    if up is None:
+        up = "y"
+        raw = raw.warn("neither bones nor motion show which axis is vertical: y; or give --up z")
     if up not in ("y", "z"):
         raise MotionError(
             f"{raw.name}: the body stands along {up}, expected y or z; export it with Y up, or "
             "give --up y or --up z if that is wrong"
         )
-    return up
+    return turned(raw, Y_UP) if up == "y" else raw
 
 
 def _decode(path: Path, joints: Sequence[Joint], rows: np.ndarray, fps: float) -> Recording:

@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 from tiny_task import LATENT, changed, getups, supine
 
 from getup_jax.config import ConfigError
+from getup_jax.config.load import load_config
 from getup_jax.core.resources import asset_path
-from getup_jax.envs.getup.build import say_which_lie
+from getup_jax.envs.getup.build import build_task, say_which_lie
 from getup_jax.envs.getup.episode import CLIP, LYING, STANDING
 from getup_jax.envs.getup.resets.archived_states import (
     SHIPPED,
@@ -230,6 +231,10 @@ def test_without_a_pose_prior_a_found_state_has_no_action(character, tmp_path):
 def test_paths_that_cannot_be_used_say_why(character, engine, tmp_path):
     with pytest.raises(ConfigError, match=r"curriculum\.archive: no folder .*getup-search"):
         pool_of(character, engine, archive=str(tmp_path / "none"))
+    logged: list[str] = []
+    with pytest.raises(ConfigError, match=r"curriculum\.archive: no folder"):
+        build_task(load_config("flat", [f"curriculum.archive={tmp_path}/none"]), logged.append)
+    assert not logged  # before the motions are read
     style = getups(character)[0]
     file = save_path(tmp_path, style, found_path(character, np.zeros(2)))
     config = changed(SETTINGS, archive=str(tmp_path))

@@ -73,6 +73,22 @@ def load_path(file: Path) -> FoundPath:
     )
 
 
+def check(folder: str | None) -> None:
+    """Raise ConfigError where the folder of archived states is not there; None: there are none."""
+    if folder is not None:
+        _place(folder)
+
+
+def _place(folder: str) -> Path:
+    place = asset_path("paths") if folder == SHIPPED else Path(folder)
+    if not place.is_dir():
+        raise ConfigError(
+            f"curriculum.archive: no folder {folder}; make it with "
+            f"`getup-search CONFIG --out {folder}`"
+        )
+    return place
+
+
 def load_paths(
     folder: str, getups: Sequence[GetUp], num_joints: int, action_size: int
 ) -> list[FoundPath | None]:
@@ -81,12 +97,7 @@ def load_paths(
     folder: of getup-search, or `authored` for those that are shipped. Without a pose prior
     (action_size = num_joints) a state's action is unknown, NaN, and only the state is taken.
     """
-    place = asset_path("paths") if folder == SHIPPED else Path(folder)
-    if not place.is_dir():
-        raise ConfigError(
-            f"curriculum.archive: no folder {folder}; make it with "
-            f"`getup-search CONFIG --out {folder}`"
-        )
+    place = _place(folder)
     found = []
     for getup in getups:
         files = sorted(place.glob(f"{getup.name}.[0-9]*.npz"))
