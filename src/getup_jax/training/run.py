@@ -153,7 +153,7 @@ def run(
         if config.train.tensorboard:
             tensorboard_module()
         if not checkpoint.steps(folder / checkpoint.CHECKPOINTS):
-            _check_start(config, display.log)
+            _check_policies(config, display.log)
         wandb = _wandb(folder, config)
         begin = time.monotonic()
         display.log(f"building the task ({described()}) ...")
@@ -179,14 +179,16 @@ def _writer(folder: Path, loop: Loop, config: Config, wandb: WandbLog | None) ->
     return contextlib.nullcontext(NoMetrics())
 
 
-def _check_start(config: Config, log: Log) -> None:
-    """Read the policy that the run begins with, if any, and say if it knows another body."""
-    if config.train.init_from is None:
-        return
-    start = checkpoint.load_policy(config.train.init_from)
-    held = None if config.composite is None else equipment_of(config.composite.goals)
-    body = body_digest(load_character(config.physics, equipment=held).model)
-    warn_if_other(start.path, start.metadata, body, log)
+def _check_policies(config: Config, log: Log) -> None:
+    """Read what the run begins with and its meta policy; say if the first knows another body."""
+    composite = config.composite
+    if composite is not None and composite.meta is not None:
+        checkpoint.load_policy(composite.meta)
+    if config.train.init_from is not None:
+        start = checkpoint.load_policy(config.train.init_from)
+        held = None if composite is None else equipment_of(composite.goals)
+        body = body_digest(load_character(config.physics, equipment=held).model)
+        warn_if_other(start.path, start.metadata, body, log)
 
 
 def _finished(folder: Path, config: Config) -> bool:
