@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -25,30 +25,12 @@ from getup_jax.rl import ppo, schedule, weight_average
 from getup_jax.rl.actor_critic import ActorCritic, make_actor_critic, normalized, observe
 from getup_jax.rl.advantages import estimate
 from getup_jax.rl.policy_update import COSINE_EVERY, Improver
+from getup_jax.rl.reward_model import RewardModel
 from getup_jax.rl.rollout import Rollout, Transition, rollout, summarize
 from getup_jax.rl.state import LearnerState, PolicyState, TrainState, owned
 
 # folded into keys, so that runs without them draw what they did
 _REWARDS, _DISCRIMINATORS, _STAGGER = 2, 3, 4
-
-
-class RewardModel(Protocol):
-    """Rewards that are learned: trained on a rollout, they score it before values are estimated."""
-
-    @property
-    def critic_weights(self) -> tuple[float, ...]:
-        """[K] of the critics' advantages."""
-        ...
-
-    def init(self, key: jax.Array) -> dict[str, Any]:
-        """Fresh discriminators by name."""
-        ...
-
-    def score(
-        self, world: Any, states: dict[str, Any], transition: Transition, key: jax.Array
-    ) -> tuple[dict[str, Any], Transition, dict[str, jax.Array]]:
-        """The discriminators after training, a rollout [T, B] with all rewards, and metrics."""
-        ...
 
 
 @struct.dataclass

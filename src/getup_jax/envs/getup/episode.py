@@ -142,6 +142,12 @@ def is_alone(state: EpisodeState) -> jax.Array:
     return alone if state.lift is None else state.lift == 0.0
 
 
+def full_steps(state: EpisodeState, stand_s: float, control_dt: float) -> jax.Array:
+    """Steps [B] that an episode with this start has, if it does not end early."""
+    left = state.duration + stand_s - state.time
+    return state.record.steps + jnp.round(left / control_dt)
+
+
 def verdict(state: EpisodeState, truncated: jax.Array, full_steps: jax.Array) -> dict:
     """Metrics of episodes that end at this step; NaN where one does not apply.
 

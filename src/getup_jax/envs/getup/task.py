@@ -16,11 +16,11 @@ from getup_jax.core.quaternion import angle, conjugate, multiply
 from getup_jax.core.types import Engine, StepOutput, take
 from getup_jax.envs.getup import rewards, terminations, user_rewards
 from getup_jax.envs.getup.action_decoder import ActionDecoder
-from getup_jax.envs.getup.curriculum import assistive_wrench, regions
+from getup_jax.envs.getup.curriculum import regions
 from getup_jax.envs.getup.curriculum.curriculum import Curriculum, Draw
 from getup_jax.envs.getup.curriculum.state import CurriculumState
 from getup_jax.envs.getup.drawn_curves import Curve, style_curve
-from getup_jax.envs.getup.episode import EpisodeState, Record, recorded, verdict
+from getup_jax.envs.getup.episode import EpisodeState, Record, full_steps, recorded, verdict
 from getup_jax.envs.getup.observation import Observer, Posture
 from getup_jax.envs.getup.user_rewards import RewardInputs
 from getup_jax.envs.getup.world import World
@@ -186,7 +186,8 @@ class GetUpTask:
         """One control step without resets; `observation` is the final one."""
         filtered = self.config.filter * action + (1.0 - self.config.filter) * state.action
         target = self.servo_target(world, state, filtered)
-        physics = self.engine.step(state.physics, target, wrench=self._wrench(world, state))
+        wrench = self.curriculum.wrench(world.terrain, self.observer, state, self.targets(state))
+        physics = self.engine.step(state.physics, target, wrench=wrench)
         state = state.replace(
             physics=physics, action=filtered, time=state.time + self.engine.control_dt
         )
@@ -231,24 +232,11 @@ class GetUpTask:
         return state, output
 
     def _verdict(self, state: EpisodeState, truncated: jax.Array) -> dict[str, jax.Array]:
-        episode = verdict(state, truncated, self._full_steps(state))
+        full = full_steps(state, self.config.stand_time_s, self.engine.control_dt)
+        episode = verdict(state, truncated, full)
         if state.region is None:
             return episode
         return episode | regions.by_region(episode, state.region)
-
-    def _wrench(self, world: World, state: EpisodeState) -> jax.Array | None:
-        """The assistive wrench and random pushes [B, 6]; None: there are none."""
-        push = self.curriculum.push(state.key, self.observer.links, state.physics.kinematics)
-        if state.lift is None:
-            return push
-        measured = state.observation[:, self.observer.slices()["features"]]
-        target = self.targets(state)[:, 0]
-        kinematics = state.physics.kinematics
-        normal = world.terrain.normal(kinematics.qpos[:, :2])
-        lift = assistive_wrench.wrench(
-            self.observer.links, kinematics, measured, target, normal, state.lift
-        )
-        return lift if push is None else lift + push
 
     def servo_target(self, world: World, state: EpisodeState, filtered: jax.Array) -> jax.Array:
         """Hinge targets [B, J]: q = decoder(z, c) + dq [P 3.4], c the curve values now."""
@@ -311,8 +299,3 @@ class GetUpTask:
     def _offset(self, state: EpisodeState) -> jax.Array:
         """Servo offsets [B, J] (rad) of the filtered actions."""
         return self.config.offset_scale * state.action[:, self.latent_size :]
-
-    def _full_steps(self, state: EpisodeState) -> jax.Array:
-        """Steps [B] that an episode with this start has, if it does not end early."""
-        left = state.duration + self.config.stand_time_s - state.time
-        return state.record.steps + jnp.round(left / self.engine.control_dt)

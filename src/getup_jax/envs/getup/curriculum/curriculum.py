@@ -32,8 +32,10 @@ from getup_jax.envs.getup.episode import (
     runs_to_the_end,
     stands,
 )
+from getup_jax.envs.getup.observation import Observer
 from getup_jax.envs.getup.resets.pool import Pool
 from getup_jax.motion.getup.curves import FeatureLinks
+from getup_jax.physics.terrain import Ground
 
 _CHEST = 0.7  # of the way from the root to the neck's base
 _PUSHES = 98  # folded into a key, as _CURVES is
@@ -134,6 +136,24 @@ class Curriculum:
             return begun
         most = self.most_lift * state.wrench[self.first_cell(pool, begun)]
         return begun.replace(lift=jnp.where(drawn.assisted, most, 0.0))
+
+    def wrench(
+        self, ground: Ground, observer: Observer, state: EpisodeState, targets: jax.Array
+    ) -> jax.Array | None:
+        """The assistive wrench and random pushes [B, 6] of a control step; None: there are none.
+
+        targets: [B, n, 3] curve values, the first of now.
+        """
+        kinematics = state.physics.kinematics
+        push = self.push(state.key, observer.links, kinematics)
+        if state.lift is None:
+            return push
+        measured = state.observation[:, observer.slices()["features"]]
+        normal = ground.normal(kinematics.qpos[:, :2])
+        lift = assistive_wrench.wrench(
+            observer.links, kinematics, measured, targets[:, 0], normal, state.lift
+        )
+        return lift if push is None else lift + push
 
     def push(
         self, key: jax.Array | None, links: FeatureLinks, kinematics: Kinematics
