@@ -23,7 +23,7 @@ from getup_jax.physics.character import load_character
 def test_all_styles_have_every_push_as_often():
     for suite in bench.suites().values():
         assert suite.episodes == bench.STYLES * len(bench.PUSHES_NS) * bench.ROUNDS
-        assert not suite.scenario.early_ends
+        assert not suite.scenario.early_termination
     (quick,) = bench.suites(quick=True).values()
     plan = make_plan(quick.scenario, quick.episodes, bench.STYLES, 2)
     push = np.linalg.norm(plan.impulse, axis=-1).round(3)
@@ -63,13 +63,13 @@ def test_nothing_ends_early():
     scenario = bench.suites(quick=True)["own"].scenario
     task = getup.evaluation_config(load_config("flat"), scenario).task
     assert task.terminate_after_s == 3600.0
-    plain = dataclasses.replace(scenario, early_ends=True)
+    plain = dataclasses.replace(scenario, early_termination=True)
     assert getup.evaluation_config(load_config("flat"), plain).task.terminate_after_s == 0.3
 
 
 def test_cells_are_by_push_and_hold_all_episodes():
     task = make_task()
-    scenario = Scenario(start="standing", pushes_ns=(0.0, 30.0), early_ends=False)
+    scenario = Scenario(start="standing", pushes_ns=(0.0, 30.0), early_termination=False)
     episodes = run(task, scenario, 4)
     cells = list(bench.cells_of("own", episodes, scenario))
     assert [(cell.ground, cell.push_ns, cell.episodes) for cell in cells] == [
@@ -136,7 +136,7 @@ def test_the_command_runs_a_checkpoint_and_writes_it(tmp_path, monkeypatch, caps
     monkeypatch.setattr(getup, "build_task", build)
     small = {
         "own": bench.Suite(
-            False, "tiny", Scenario(episodes=2, pushes_ns=(0.0,), early_ends=False, seed=1)
+            False, "tiny", Scenario(episodes=2, pushes_ns=(0.0,), early_termination=False, seed=1)
         )
     }
     monkeypatch.setattr(bench, "suites", lambda quick=False: small)

@@ -74,7 +74,7 @@ def test_steps_after_the_end_mean_nothing_to_the_rule_of_host():
     assert not host(base[[0, 0, 1]], running).any()
 
 
-def test_early_ends_are_counted_as_the_task_counts_them():
+def test_early_termination_are_counted_as_the_task_counts_them():
     """Nine bad steps in a row at 30 Hz are 0.3 s and no more; the tenth ends an episode."""
     dt = 1 / 30
     most = round(TaskConfig.terminate_after_s / dt)

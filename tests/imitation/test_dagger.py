@@ -12,7 +12,7 @@ from tiny_composite import COMPOSITE, CONFIG, clips, tiny_composite
 
 from compiled import first_policy
 from getup_jax.envs.composite.meta.chain import with_meta
-from getup_jax.envs.composite.reference_state_init import FOLLOWING, Following, clip_starts
+from getup_jax.envs.composite.reference_state_init import FOLLOWING, Following, reference_states
 from getup_jax.imitation import dagger
 from getup_jax.motion.authoring.loops import repeated
 from getup_jax.physics.character import load_character
@@ -87,7 +87,7 @@ def test_what_follows_on_an_arc_is_the_same_moment_of_its_clip(built):
     qpos = bend.qpos.copy()
     qpos[:, 7:] *= 0.9
     family = [bend, dataclasses.replace(bend, qpos=qpos)]
-    starts, following = clip_starts([family], (0.0, 0.5), env.character, env.engine, 1000)
+    starts, following = reference_states([family], (0.0, 0.5), env.character, env.engine, 1000)
     own = np.asarray(starts.physics.kinematics.qpos)[:, 7:]
     half = len(own) // 2
     np.testing.assert_allclose(own[half:], 0.9 * own[:half], atol=1e-6)

@@ -57,7 +57,7 @@ def suites(quick: bool = False) -> dict[str, Suite]:
     number = STYLES * len(pushes) * (1 if quick else ROUNDS)
 
     def suite(starts: str, irregular: bool = False, **given: Any) -> Suite:
-        common = {"episodes": number, "pushes_ns": pushes, "seed": SEED, "early_ends": False}
+        common = {"episodes": number, "pushes_ns": pushes, "seed": SEED, "early_termination": False}
         if irregular:
             common["terrain_seed"] = SEED
         return Suite(irregular, starts, Scenario(**common, **given))

@@ -164,7 +164,7 @@ def evaluation_config(config: Config, scenario: Scenario) -> Config:
         terminate_reward=TaskConfig.terminate_reward,
         pool_size=_episode_count(config, scenario),
         stand_time_s=stand_time_s,
-        terminate_after_s=task.terminate_after_s if scenario.early_ends else _NEVER_S,
+        terminate_after_s=task.terminate_after_s if scenario.early_termination else _NEVER_S,
         **_dropped(task, scenario.drops),
     )
     terrain = _evaluation_terrain(config.terrain, scenario.terrain_seed)

@@ -52,7 +52,7 @@ class Scenario:
     terrain_seed: int | None = None  # of the irregular ground; None: that of the training
     engine: str | None = None  # native | mjx; None: as in training
     # False: an episode that would end early goes on; `evaluation/verdicts.py` says that it did
-    early_ends: bool = True
+    early_termination: bool = True
 
     @property
     def kind(self) -> int:

@@ -9,7 +9,7 @@
 
 The first three want an episode that no early end of [P 5.3] would have cut short: the task reward
 below 0.1, or the head on the floor, for more than 0.3 s. HoST has none, so that the rollout goes on
-(`Scenario.early_ends`). The 0.85 of sca2022 and thesis are ours; the papers give no number.
+(`Scenario.early_termination`). The 0.85 of sca2022 and thesis are ours; the papers give no number.
 """
 
 from __future__ import annotations

@@ -16,10 +16,10 @@ from getup_jax.envs.composite.groups import objective_weights, resolve_groups
 from getup_jax.envs.composite.reference_state_init import (
     Family,
     Following,
-    clip_starts,
     families,
     hinges_of,
     mixed,
+    reference_states,
     repeated_as,
     resampled,
 )
@@ -108,7 +108,7 @@ def start_states(
     if len(config.groups) > 1 and (config.start_mixed or config.warm_start):
         after = mixed(moving, start, config, character, clips)
         moving = after if config.start_mixed else repeated_as(after, moving)
-    return clip_starts(moving, turns, character, engine, most, after)
+    return reference_states(moving, turns, character, engine, most, after)
 
 
 def _targets(task: CompositeTask, clips: dict[str, list[Clip]], config: TaskConfig) -> dict:

@@ -81,7 +81,7 @@ def hinges_of(
         yield group.name, np.isin(character.joint_link, group.links)
 
 
-def clip_starts(
+def reference_states(
     moving: Sequence[Family],
     turns: Sequence[float],
     character: CharacterSpec,
