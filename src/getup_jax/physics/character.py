@@ -103,7 +103,7 @@ def load_character(
     bodies = [model.body(i).name for i in range(1, model.nbody)]
     hinges = hinges_of(model)
     names = tuple(model.joint(i).name for i in hinges)
-    mirror_joint, mirror_sign = _mirror_table(names)
+    mirror_joint, mirror_sign = _mirror_table(model, names)
     return CharacterSpec(
         model=model,
         link_names=tuple(bodies),
@@ -175,18 +175,25 @@ def _head_sphere(model: mujoco.MjModel) -> tuple[int, tuple[float, float, float]
     return int(geom.bodyid[0]) - 1, (x, y, z), float(geom.size[0])
 
 
-def _mirror_table(names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Right axes are mirrored in the file, so only unpaired hinges flip their sign.
+def _mirror_table(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """The hinge on the other side, and -1 where its axis is not the mirror image.
 
-    A wrist that one side alone has keeps its angles.
+    An axis of rotation (x, y, z) has the image (-x, y, -z). A wrist that one side alone has keeps
+    its angles.
     """
+    data = mujoco.MjData(model)
+    data.qpos[3:7] = 1.0, 0.0, 0.0, 0.0
+    mujoco.mj_kinematics(model, data)
+    axes = np.array([data.joint(name).xaxis for name in names])
     other = {"_l_": "_r_", "_r_": "_l_"}
     index, sign = [], []
-    for name in names:
+    for own, name in enumerate(names):
         side = next((s for s in other if s in name), None)
         image = name.replace(side, other[side]) if side else name
-        index.append(names.index(image if image in names else name))
-        sign.append(-1.0 if side is None and name.endswith(("_abd", "_twist")) else 1.0)
+        known = image in names
+        index.append(names.index(image) if known else own)
+        flips = known and axes[own] @ (axes[index[-1]] * [-1, 1, -1]) < 0
+        sign.append(-1.0 if flips else 1.0)
     return np.array(index, np.int32), np.array(sign)
 
 

@@ -5,6 +5,10 @@ bodies: {root: pelvis, ltibia: shin_l}
 joints: {ltibiarx: shin_l_flex}
 geoms: {lsole: foot_l}
 keyframes: {stand: neutral}
+root: pelvis                    # where the file's free body is another one, by its name there
+add: ...                        # what the file lacks, by our names: see character_additions.py
+servos: ...
+neutral: ...
 
 Names that are not listed stay. `physics.character` takes the map in place of the MJCF file.
 """
@@ -22,6 +26,8 @@ import mujoco
 from getup_jax.config import ConfigError, yaml_text
 from getup_jax.config.check import shown
 from getup_jax.config.registry import check_name
+from getup_jax.physics.character_additions import ADDITIONS, add_what_lacks
+from getup_jax.physics.reroot import rerooted
 
 SUFFIX = ".yaml"
 _PACKAGE = "package:"
@@ -36,11 +42,14 @@ def read_mapped(path: Path) -> mujoco.MjSpec:
     """
     content = _content(path)
     spec = mujoco.MjSpec.from_file(str(_mjcf(path, content["mjcf"])))
+    if (root := content.get("root")) is not None:
+        spec = rerooted(spec, str(root), str(path))
     for kind in _KINDS:
         names = content.get(kind) or {}
         if not isinstance(names, Mapping):
             raise ConfigError(f"{path}: {kind}: expected {{name in the file: name}}, got {names!r}")
         _rename(spec, kind, {str(old): str(new) for old, new in names.items()}, f"{path}: {kind}")
+    add_what_lacks(spec, content, str(path))
     return spec
 
 
@@ -52,7 +61,7 @@ def _content(path: Path) -> Mapping[str, Any]:
             f"docs/character.md; got {shown(content)}"
         )
     for key in content:
-        check_name(str(key), ("mjcf", *_KINDS), str(path))
+        check_name(str(key), ("mjcf", "root", *_KINDS, *ADDITIONS), str(path))
     return content
 
 
@@ -83,6 +92,8 @@ def _rename(spec: mujoco.MjSpec, kind: str, names: Mapping[str, str], where: str
     twice = sorted({name for name in after if after.count(name) > 1})
     if twice:
         raise ConfigError(f"{where}: {', '.join(twice)}: would be the name of two")
+    if kind in ("joints", "geoms"):
+        _without_tendons(spec, where)
     for old in names:
         elements[old].name = f"\n{old}"  # no name of a file
     for old, new in names.items():
@@ -90,17 +101,48 @@ def _rename(spec: mujoco.MjSpec, kind: str, names: Mapping[str, str], where: str
     _refer(spec, kind, names)
 
 
+def _without_tendons(spec: mujoco.MjSpec, where: str) -> None:
+    """Take out tendons that only measure; their joints cannot get other names."""
+    for tendon in list(spec.tendons):
+        forces = (*tendon.stiffness, *tendon.damping, tendon.frictionloss, *tendon.range)
+        if any(forces):
+            raise ConfigError(
+                f"{where}: tendon {tendon.name!r} pulls at joints; what it does is lost with other "
+                "names; take it out of a copy of the file"
+            )
+        spec.delete(tendon)
+
+
+_OBJ, _EQ = mujoco.mjtObj, mujoco.mjtEq
+# What refers to an element by name: list of the spec, field with the name, field with the kind of
+# what it names, and the kinds that are meant here.
+_REFERENCES: dict[str, tuple[tuple[str, str, str, tuple], ...]] = {
+    "joints": (
+        ("actuators", "target", "trntype", (mujoco.mjtTrn.mjTRN_JOINT,)),
+        *(("equalities", f"name{k}", "type", (_EQ.mjEQ_JOINT,)) for k in (1, 2)),
+        ("sensors", "objname", "objtype", (_OBJ.mjOBJ_JOINT,)),
+    ),
+    "bodies": (
+        *(("excludes", f"bodyname{k}", "", ()) for k in (1, 2)),
+        *(("equalities", f"name{k}", "objtype", (_OBJ.mjOBJ_BODY,)) for k in (1, 2)),
+        ("sensors", "objname", "objtype", (_OBJ.mjOBJ_BODY, _OBJ.mjOBJ_XBODY)),
+        ("sensors", "refname", "reftype", (_OBJ.mjOBJ_BODY, _OBJ.mjOBJ_XBODY)),
+        ("cameras", "targetbody", "", ()),
+        ("lights", "targetbody", "", ()),
+    ),
+    "geoms": (
+        *(("pairs", f"geomname{k}", "", ()) for k in (1, 2)),
+        ("sensors", "objname", "objtype", (_OBJ.mjOBJ_GEOM,)),
+        ("sensors", "refname", "reftype", (_OBJ.mjOBJ_GEOM,)),
+    ),
+    "keyframes": (),
+}
+
+
 def _refer(spec: mujoco.MjSpec, kind: str, names: Mapping[str, str]) -> None:
-    """What refers to the elements by name."""
-    if kind == "joints":
-        for actuator in spec.actuators:
-            if actuator.trntype == mujoco.mjtTrn.mjTRN_JOINT:
-                actuator.target = names.get(actuator.target, actuator.target)
-    if kind == "bodies":
-        for exclude in spec.excludes:
-            exclude.bodyname1 = names.get(exclude.bodyname1, exclude.bodyname1)
-            exclude.bodyname2 = names.get(exclude.bodyname2, exclude.bodyname2)
-    if kind == "geoms":
-        for pair in spec.pairs:
-            pair.geomname1 = names.get(pair.geomname1, pair.geomname1)
-            pair.geomname2 = names.get(pair.geomname2, pair.geomname2)
+    """Give the new names to what refers to the elements."""
+    for group, field, kind_field, kinds in _REFERENCES[kind]:
+        for element in getattr(spec, group):
+            if not kind_field or getattr(element, kind_field) in kinds:
+                old = getattr(element, field)
+                setattr(element, field, names.get(old, old))

@@ -7,16 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
+from getup_jax.config import PhysicsConfig
 from getup_jax.core.resources import asset_path
 from getup_jax.motion.authoring.keyframe_clip import clip_from_keyframes
 from getup_jax.motion.authoring.keyframe_file import read_keyframes
+from getup_jax.motion.authoring.other_body import carried_over, sized, takes_angles
 from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.getup import curves
 from getup_jax.motion.getup.events import link_positions
 from getup_jax.motion.getup.getups import clip_features, evenly
 from getup_jax.motion.io.curve_file import check_start, read_curve_file
 from getup_jax.physics.body_digest import body_digest
-from getup_jax.physics.character import CharacterSpec
+from getup_jax.physics.character import CharacterSpec, load_character
 
 _FIT_SAMPLES = 256  # of every curve
 _loaded: dict[tuple[str, ...], tuple[GetUp, ...]] = {}  # by the body
@@ -27,6 +29,8 @@ def load_authored(character: CharacterSpec) -> list[GetUp]:
 
     A reference motion is called as its file; a drawn style NAME of 2.5 s is NAME@2.5. What a
     process has loaded for a body of these shapes and joints it keeps; the arrays are read-only.
+    The keyframes' angles are those of the default body: on one with other hinges its motions are
+    retargeted, and on one of another size the drawn heights are scaled.
     """
     body = body_digest(character.model)
     key = tuple(body[part] for part in ("lengths", "masses", "shapes", "joints"))
@@ -37,8 +41,12 @@ def load_authored(character: CharacterSpec) -> list[GetUp]:
 
 def _load(character: CharacterSpec) -> list[GetUp]:
     files = sorted(asset_path("motions").glob("*.yaml"))
-    motions = [read_keyframes(path, character) for path in files]
-    clips = [clip_from_keyframes(motion, character) for motion in motions]
+    written_for = load_character(PhysicsConfig())
+    reads = character if takes_angles(character, written_for) else written_for
+    motions = [read_keyframes(path, reads) for path in files]
+    clips = [clip_from_keyframes(motion, reads) for motion in motions]
+    if reads is not character:
+        clips = [carried_over(clip, reads, character) for clip in clips]
     references = [
         GetUp(clip.name, clip.duration, points, clip, motion.strategy, error)
         for motion, clip in zip(motions, clips, strict=True)
@@ -46,7 +54,8 @@ def _load(character: CharacterSpec) -> list[GetUp]:
     ]
     names = tuple(clip.name for clip in clips)
     drawn = sorted(asset_path("curves").glob("*.yaml"))
-    found = [*references, *(getup for path in drawn for getup in read_drawn(path, names))]
+    styles = [getup for path in drawn for getup in read_drawn(path, names)]
+    found = [*references, *(sized(style, written_for, character) for style in styles)]
     for getup in found:
         getup.points.setflags(write=False)
         if getup.clip is not None:

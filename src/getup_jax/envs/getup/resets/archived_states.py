@@ -109,7 +109,8 @@ def load_paths(
             if shape != (7 + num_joints, action_size):
                 raise ConfigError(
                     f"{file}: expected {7 + num_joints} positions and {action_size} actions, got "
-                    f"{shape[0]} and {shape[1]}; it was found for another character or prior"
+                    f"{shape[0]} and {shape[1]}; it was found for another character or prior; set "
+                    "curriculum.archive=null, or search anew with getup-search"
                 )
         found.append(_joined(paths) if paths else None)
     return found
