@@ -106,7 +106,7 @@ def test_the_documented_command_trains(dm_map, dm, tmp_path, cache):
     settings = [f"physics.character={dm_map}", "curriculum.archive=null", "prior=null"]
     settings += ["motion.augment_poses=100", "motion.curves=[supine_situp_squat]"]
     settings += ["task.pool_size=16", "ppo.num_envs=8", "ppo.num_steps=8", "ppo.minibatch_size=64"]
-    settings += ["train.total_steps=128", "train.threads=1"]
+    settings += ["train.total_steps=128", "physics.threads=1"]
     run = tmp_path / "run"
     assert cli.train_main(["flat", *settings, "--run", str(run)]) == 0
     assert (run / "metrics.jsonl").read_text().count("\n") >= 2

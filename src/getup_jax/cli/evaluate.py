@@ -98,5 +98,6 @@ def to_scenario(args: argparse.Namespace) -> Scenario:
         drops=args.drops,
         stand_time_s=args.stand_time,
         terrain_seed=args.terrain_seed,
+        ground=args.ground,
         engine=args.engine,
     )

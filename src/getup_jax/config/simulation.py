@@ -8,6 +8,8 @@ import math
 from getup_jax.config.check import require
 from getup_jax.config.ranges import LAST_SEED, MOST_COUNT, check_numbers, number
 
+_LEAST_OWN_M = 8.0  # side of a ground of one's own: its starts are 3 m from the edge
+
 
 @dataclasses.dataclass(frozen=True)
 class PhysicsConfig:
@@ -44,8 +46,14 @@ class PhysicsConfig:
 class TerrainConfig:
     """Irregular ground in four regions: flat, easy, medium and hard [P 3.2, 5.4].
 
-    Half of each irregular region is rough, and half has even slopes in all directions.
+    Half of each irregular region is rough, and half has even slopes in all directions. Or they are
+    a third, two thirds and all of the heights in a file.
     """
+
+    # PNG, .npy or MuJoCo height field of one's own ground, region_size_m on a side
+    heights: str | None = None
+    # from its lowest to its highest place; null: an .npy file is in metres
+    height_m: float | None = number(None, above=0, most=100)
 
     # another seed is another ground of the same kind
     seed: int = number(0, least=0, most=LAST_SEED)
@@ -80,19 +88,33 @@ class TerrainConfig:
         kinds = ("success", "schedule", "none")
         ok = self.curriculum in kinds
         require(ok, "terrain.curriculum", f"one of {kinds}", self.curriculum)
-        self._check_sizes()
+        if self.heights is None:
+            expected = "null, as it belongs to terrain.heights"
+            require(self.height_m is None, "terrain.height_m", expected, self.height_m)
+            self._check_sizes()
+        else:
+            expected = f"at least {_LEAST_OWN_M:g} m"
+            ok = self.region_size_m >= _LEAST_OWN_M
+            require(ok, "terrain.region_size_m", expected, self.region_size_m)
+            self._check_multiples(
+                ("region_size_m", 2 * self.grid_step_m, "2 x terrain.grid_step_m"),
+                ("border_m", self.grid_step_m, "terrain.grid_step_m"),
+            )
 
     def _check_sizes(self) -> None:
         ok = self.region_size_m >= 2 * self.slope_block_m
         expected = f"at least 2 x terrain.slope_block_m = {2 * self.slope_block_m:g} m"
         require(ok, "terrain.region_size_m", expected, self.region_size_m)
-        pairs = (
+        self._check_multiples(
             ("region_size_m", 2 * self.slope_block_m, "2 x terrain.slope_block_m"),
             ("region_size_m", 2 * self.tile_m, "2 x terrain.tile_m"),
             ("slope_block_m", 2 * self.grid_step_m, "2 x terrain.grid_step_m"),
             ("tile_m", self.grid_step_m, "terrain.grid_step_m"),
             ("border_m", self.grid_step_m, "terrain.grid_step_m"),
         )
+
+    def _check_multiples(self, *pairs: tuple[str, float, str]) -> None:
+        """Each a setting, the length (m) that it is a multiple of, and what that is."""
         for name, unit, text in pairs:
             value = getattr(self, name)
             ok = abs(value / unit - round(value / unit)) < 1e-6 and value >= unit

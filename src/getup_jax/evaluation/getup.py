@@ -167,7 +167,7 @@ def evaluation_config(config: Config, scenario: Scenario) -> Config:
         terminate_after_s=task.terminate_after_s if scenario.early_termination else _NEVER_S,
         **_dropped(task, scenario.drops),
     )
-    terrain = _evaluation_terrain(config.terrain, scenario.terrain_seed)
+    terrain = _evaluation_terrain(config.terrain, scenario)
     config = dataclasses.replace(
         config, physics=physics, task=task, curriculum=None, terrain=terrain, seed=scenario.seed
     )
@@ -190,12 +190,18 @@ def _episode_count(config: Config, scenario: Scenario) -> int:
     return scenario.episodes or (curves or _EPISODES) * regions
 
 
-def _evaluation_terrain(terrain: TerrainConfig | None, seed: int | None) -> TerrainConfig | None:
-    """The ground of the training, or another one of its kind; rag-dolls fall anew in any case."""
+def _evaluation_terrain(terrain: TerrainConfig | None, scenario: Scenario) -> TerrainConfig | None:
+    """The ground of the training, or another one; rag-dolls fall anew in any case."""
+    seed, ground = scenario.terrain_seed, scenario.ground
     if terrain is None:
-        if seed is not None:
-            raise ConfigError("--terrain-seed: the policy was trained on a flat plane")
+        for name, given in (("--terrain-seed", seed), ("--ground", ground)):
+            if given is not None:
+                raise ConfigError(f"{name}: the policy was trained on a flat plane")
         return None
+    if ground is not None:
+        terrain = ground.put_into(terrain)
+    if seed is not None and terrain.heights is not None:
+        raise ConfigError(f"--terrain-seed: the ground is that of {terrain.heights}; leave it out")
     own = terrain.seed if seed is None else seed
     # another number of them falls otherwise than those of the training did
     return dataclasses.replace(terrain, seed=own, drops=_DROPS - (terrain.drops == _DROPS))

@@ -7,6 +7,8 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+from getup_jax.evaluation.own_ground import GROUND_HELP, own_ground
+
 _EXAMPLES = """\
 examples:
   getup-eval                                           the shipped policy
@@ -52,6 +54,7 @@ def eval_parser() -> argparse.ArgumentParser:
         metavar="S",
         help="another irregular ground of the same kind (default: that of the training)",
     )
+    add("--ground", type=own_ground, metavar="FILE:SIDE[:HEIGHT]", help=GROUND_HELP)
     add(
         "--script",
         type=Path,

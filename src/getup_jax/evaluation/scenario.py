@@ -16,6 +16,7 @@ from getup_jax.envs.getup.episode import LYING, STANDING
 from getup_jax.envs.getup.resets.pool import Pool, angle_gap
 from getup_jax.envs.getup.resets.rag_doll import DROPS
 from getup_jax.envs.getup.resets.region_pool import region_starts
+from getup_jax.evaluation.own_ground import OwnGround
 from getup_jax.motion.clips import Clip, GetUp
 from getup_jax.motion.getup import events
 from getup_jax.motion.io.curve_file import CurveFile
@@ -50,6 +51,7 @@ class Scenario:
     drops: str | None = None
     stand_time_s: float | None = None  # to stand after the curve's end; None: as in training
     terrain_seed: int | None = None  # of the irregular ground; None: that of the training
+    ground: OwnGround | None = None  # in place of the irregular ground of the training
     engine: str | None = None  # native | mjx; None: as in training
     # False: an episode that would end early goes on; `evaluation/verdicts.py` says that it did
     early_termination: bool = True
@@ -87,6 +89,7 @@ class Scenario:
             "--duration-scale": self.duration_scale != (1.0, 1.0),
             "--stand-time": self.stand_time_s is not None,
             "--terrain-seed": self.terrain_seed is not None,
+            "--ground": self.ground is not None,
         }
         wrong = [name for name, is_given in given.items() if is_given]
         if wrong:

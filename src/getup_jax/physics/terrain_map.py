@@ -6,6 +6,9 @@ is rough: tiles whose corners are moved up and down [P 3.2 and figure 3].
 
     medium | hard
     flat   | easy
+
+A ground of one's own (`terrain.heights`) takes the place of the irregular ones: a third of its
+heights is easy, two thirds are medium, and as it is it is hard.
 """
 
 from __future__ import annotations
@@ -13,14 +16,19 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from getup_jax.config import ConfigError, TerrainConfig
+from getup_jax.physics.height_file import own_heights, steepness
 from getup_jax.physics.terrain import HeightField
 
 REGIONS = ("flat", "easy", "medium", "hard")
 _SPAWN_STEP_M = 0.5  # side of a spawn cell
 _SPAWN_MARGIN_M = 1.0  # from the edges of a region, and from the foot of a slope
 _CREASE_MARGIN_M = 0.7  # from the edge between two slopes
+_RAMP_M = 2.0  # from the edge of a ground of one's own, along which its heights begin
+_STEEPEST_START_DEG = 40.0  # within a margin of a start on it
+_EVEN = 0.1  # slopes (m a metre) of one even slope differ by less
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -33,6 +41,7 @@ class TerrainMap:
     spawn_xy: np.ndarray  # [S, 2] centres of the spawn cells (m)
     spawn_region: np.ndarray  # [S] index into REGIONS
     spawn_sloped: np.ndarray  # [S] bool, on an even slope; otherwise flat or rough
+    even: np.ndarray | None = None  # [n - 1, n - 1] bool, cells on an even slope; None: by place
 
     @property
     def half(self) -> float:
@@ -55,7 +64,14 @@ class TerrainMap:
         return np.where(inside, cell[..., 0] + 2 * cell[..., 1], -1)
 
     def is_sloped(self, xy: np.ndarray) -> np.ndarray:
-        """Whether places xy [..., 2] (m) are in the half of an irregular region that has slopes."""
+        """Whether places xy [..., 2] (m) are in the half of an irregular region that has slopes.
+
+        On a ground of one's own: whether the ground around them is one even slope.
+        """
+        if self.even is not None:
+            cell = np.floor((np.asarray(xy) - self.origin) / self.step).astype(int)
+            column, row = np.moveaxis(np.clip(cell, 0, len(self.even) - 1), -1, 0)
+            return self.even[row, column] & (self.region(xy) > 0)
         y = np.asarray(xy)[..., 1] % self.region_size
         return (self.region(xy) > 0) & (y < self.region_size / 2)
 
@@ -78,8 +94,59 @@ class TerrainMap:
         return self.spawn_xy[cell] + rng.uniform(-0.5, 0.5, (count, 2)) * _SPAWN_STEP_M
 
 
+def own_ground(config: TerrainConfig) -> TerrainMap:
+    """The ground of `terrain.heights`, in three sizes beside a flat region."""
+    field, step, size = own_heights(config), config.grid_step_m, config.region_size_m
+    points, border = len(field) - 1, round(config.border_m / step)
+    inwards = step * np.minimum(np.arange(points + 1), np.arange(points, -1, -1))
+    ramp = np.clip(inwards / _RAMP_M, 0.0, 1.0)  # no cliffs between the regions
+    field = field * np.minimum(ramp[:, None], ramp)
+    heights = np.zeros((2 * points + 1 + 2 * border,) * 2)
+    for index in range(1, len(REGIONS)):
+        column, row = border + points * (index % 2), border + points * (index // 2)
+        heights[row : row + points + 1, column : column + points + 1] = (
+            field * index / (len(REGIONS) - 1)
+        )
+    even, steep = _evenness(heights, step)
+    ground = TerrainMap(heights, step, size, np.zeros((0, 2)), np.zeros(0), np.zeros(0), even)
+    middles = np.arange(_SPAWN_STEP_M / 2 - size, size, _SPAWN_STEP_M)
+    xy = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
+    region, inside = ground.region(xy), np.abs(xy % size - size / 2)
+    margin = np.where(region == 0, _SPAWN_MARGIN_M, _RAMP_M + _SPAWN_MARGIN_M)
+    cell = np.floor((xy - ground.origin) / step).astype(int)
+    fair = (inside.max(axis=1) <= size / 2 - margin) & ~steep[cell[:, 1], cell[:, 0]]
+    for index, name in enumerate(REGIONS):
+        if not fair[region == index].any():
+            raise ConfigError(
+                f"terrain.heights: {config.heights}: no place of the region {name!r} is less than "
+                f"{_STEEPEST_START_DEG:g} degrees steep; make terrain.height_m smaller"
+            )
+    xy, region = xy[fair], region[fair]
+    return dataclasses.replace(
+        ground, spawn_xy=xy, spawn_region=region, spawn_sloped=ground.is_sloped(xy)
+    )
+
+
+def _evenness(heights: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Cells [n - 1, n - 1] on an even slope, and cells near a place too steep to start from."""
+    z = heights
+    slope = np.stack([z[1:, 1:] - z[1:, :-1], z[1:, 1:] - z[:-1, 1:]]) / step
+    other = np.stack([z[:-1, 1:] - z[:-1, :-1], z[1:, :-1] - z[:-1, :-1]]) / step
+    reach = 2 * round(_CREASE_MARGIN_M / step) + 1
+    high = maximum_filter(np.maximum(slope, other), (1, reach, reach))
+    low = minimum_filter(np.minimum(slope, other), (1, reach, reach))
+    even = np.hypot(*(high - low)) < _EVEN
+    wide = 2 * round(_SPAWN_MARGIN_M / step) + 1
+    return even, maximum_filter(steepness(heights, step), wide) > _STEEPEST_START_DEG
+
+
 def make_terrain(config: TerrainConfig) -> TerrainMap:
-    """The ground of a config; the same seed gives the same ground."""
+    """The ground of a config; the same seed gives the same ground.
+
+    Raises ConfigError where `terrain.heights` cannot be used.
+    """
+    if config.heights is not None:
+        return own_ground(config)
     rng = np.random.default_rng(config.seed)
     size, step = config.region_size_m, config.grid_step_m
     points, border = round(size / step), round(config.border_m / step)

@@ -91,7 +91,7 @@ def until_enough(wanted: np.ndarray, make: Callable[[np.ndarray], Starts], probl
         raise ConfigError(f"task.limp_share: {problem} on flat ground; see the physics settings")
     raise ConfigError(
         f"terrain: {problem} in the region {where!r}; "
-        "make terrain.slope_deg or terrain.rough_m smaller"
+        "make terrain.slope_deg, rough_m or height_m smaller"
     )
 
 

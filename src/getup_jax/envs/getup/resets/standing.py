@@ -65,7 +65,7 @@ def stand(
         else:
             raise ConfigError(
                 f"terrain: no standing starts in the region {REGIONS[region]!r}: the legs do not "
-                "reach the ground; make terrain.slope_deg or terrain.rough_m smaller"
+                "reach the ground; make terrain.slope_deg, rough_m or height_m smaller"
             )
         parts.append(kept[:wanted])
     qpos = np.concatenate(parts)
