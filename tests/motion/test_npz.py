@@ -136,7 +136,7 @@ def test_a_missing_array_is_named_and_others_are_not_read(tmp_path):
     file = tmp_path / "a.npz"
     np.savez(file, a=1.0, b=np.array([object()], dtype=object))
     assert read_arrays(file, ("a",)) == {"a": 1.0}
-    with pytest.raises(MotionError, match=r"expected \['c'\], got \['a', 'b'\]; import again"):
+    with pytest.raises(MotionError, match=r"expected \['c'\], or .* SMPL, got \['a', 'b'\]"):
         read_arrays(file, ("c",))
     with pytest.raises(MotionError, match="not a clip"):
         read_arrays(file, ("b",))

@@ -19,7 +19,7 @@ from getup_jax.config import MotionConfig, PhysicsConfig
 from getup_jax.evaluation.options import output
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.io.glb_writer import require_glb
-from getup_jax.motion.io.readers import ReadOptions, motion_files
+from getup_jax.motion.io.readers import ReadOptions, is_clip, motion_files
 from getup_jax.motion.io.takes import Take, write_takes
 from getup_jax.motion.io.usd_writer import require_usd
 from getup_jax.motion.library import cpus, load_motions
@@ -112,12 +112,12 @@ def _add_reading(parser: argparse.ArgumentParser) -> None:
         "--up",
         choices=("auto", "y", "z"),
         default="auto",
-        help="vertical axis of BVH files (default: along which their skeleton stands, else y)",
+        help="vertical axis of BVH and SMPL files (default: along which the body stands)",
     )
     parser.add_argument(
         "--source-fps",
         type=_rate,
-        help="frames a second of BVH and AMC files, in place of what they say (AMC: 120)",
+        help="frames a second of BVH, AMC and SMPL files, in place of what they say (AMC: 120)",
     )
     parser.add_argument("--fps", type=_rate, default=30.0, help="rate of the clips (default: 30)")
     parser.add_argument("--floor", type=_finite, help="height of the recording's floor (m)")
@@ -252,7 +252,7 @@ def _retarget(
         floor=args.floor,
         names=read_map(args.names) if args.names else None,
     )
-    jobs = [Job(file, character, read, settings) for file in files if file.suffix.lower() != ".npz"]
+    jobs = [Job(file, character, read, settings) for file in files if not is_clip(file)]
     results = retarget_files(jobs, cpus(), done)
     found = dict(zip([job.path for job in jobs], results, strict=True))
     for file in files:

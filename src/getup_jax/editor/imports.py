@@ -15,7 +15,7 @@ from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.getup.getups import find_getups
 from getup_jax.motion.io.curve_file import DURATION_S, CurveFile
 from getup_jax.motion.io.guard import one_line
-from getup_jax.motion.io.readers import SUFFIXES, ReadOptions
+from getup_jax.motion.io.readers import SUFFIXES, ReadOptions, is_clip
 from getup_jax.motion.retarget.cache import kept, read_npz
 from getup_jax.motion.retarget.job import Job
 from getup_jax.motion.retarget.retarget import RetargetSettings
@@ -100,7 +100,7 @@ def _clip(name: str, content: bytes, character: CharacterSpec, stop: Stop) -> Cl
 
 
 def _retargeted(path: Path, character: CharacterSpec, stop: Stop) -> Clip:
-    if path.suffix == ".npz":
+    if is_clip(path):
         return read_npz(path, character)[0]
     job = Job(path, character, ReadOptions(allow_short=True), RetargetSettings())
     return kept(job, lambda job: run_apart(job, stop, _WORKER_BYTES))[0]

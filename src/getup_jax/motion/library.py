@@ -14,7 +14,7 @@ from getup_jax.config import MotionConfig
 from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.getup.getups import cut_getup, find_getups
 from getup_jax.motion.io import curve_file
-from getup_jax.motion.io.readers import ReadOptions, motion_files
+from getup_jax.motion.io.readers import ReadOptions, is_clip, motion_files
 from getup_jax.motion.retarget.cache import Job, read_npz, retarget_files
 from getup_jax.motion.retarget.retarget import RetargetReport, RetargetSettings
 from getup_jax.physics.character import CharacterSpec
@@ -110,11 +110,7 @@ def _clips(
 ) -> tuple[list[Clip], dict[str, RetargetReport]]:
     """Every file's clip; short files are taken, as their warning says."""
     read = ReadOptions(allow_short=True)
-    jobs = [
-        Job(file, character, read, RetargetSettings())
-        for file in files
-        if file.suffix.lower() != ".npz"
-    ]
+    jobs = [Job(file, character, read, RetargetSettings()) for file in files if not is_clip(file)]
     fresh = dict(zip([job.path for job in jobs], retarget_files(jobs, cpus(), done), strict=True))
     clips, report = [], {}
     for file in files:

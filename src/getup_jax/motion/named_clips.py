@@ -10,7 +10,7 @@ from getup_jax.core.resources import asset_path
 from getup_jax.motion.authoring.keyframe_clip import clip_from_keyframes
 from getup_jax.motion.authoring.keyframe_file import read_keyframes
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.io.readers import ReadOptions
+from getup_jax.motion.io.readers import ReadOptions, is_clip
 from getup_jax.motion.retarget.cache import Job, read_npz, retarget_files
 from getup_jax.motion.retarget.retarget import RetargetSettings
 from getup_jax.physics.character import CharacterSpec
@@ -32,7 +32,7 @@ def _named(name: str, character: CharacterSpec, key: str) -> Clip:
     try:
         if authored.is_file():
             return clip_from_keyframes(read_keyframes(authored, character), character)
-        if path.suffix.lower() == ".npz" and path.is_file():
+        if path.is_file() and is_clip(path):
             return read_npz(path, character)[0]
         if path.is_file():
             job = Job(path, character, ReadOptions(allow_short=True), RetargetSettings())

@@ -31,16 +31,26 @@ def read_arrays(file: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
             found = [name.removesuffix(".npy") for name in archive.namelist()]
             if not set(names) <= set(found):
                 raise MotionError(
-                    f"{file}: not a clip: expected {sorted(names)}, got {sorted(found)[:20]}; "
-                    "import again"
+                    f"{file}: not a clip: expected {sorted(names)}, or poses, trans and "
+                    f"mocap_framerate of SMPL, got {sorted(found)[:20]}; import again"
                 )
             return {name: _read(archive, f"{name}.npy") for name in names}
     except MotionError:
         raise
     except Exception as error:  # zip and npy headers fail in many ways
         raise MotionError(
-            f"{file}: not a clip: expected an .npz file of getup-motion or getup-edit; import again"
+            f"{file}: not a clip: expected an .npz file of getup-motion, getup-edit or SMPL; "
+            "import again"
         ) from error
+
+
+def names_in(file: Path) -> tuple[str, ...]:
+    """The names of the arrays in a file; MotionError where it is no .npz."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            return tuple(name.removesuffix(".npy") for name in archive.namelist())
+    except Exception as error:  # zip fails in many ways
+        raise MotionError(f"{file}: not a clip: expected an .npz file; save it again") from error
 
 
 def _read(archive: zipfile.ZipFile, name: str) -> np.ndarray:

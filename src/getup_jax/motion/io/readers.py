@@ -6,21 +6,24 @@ import dataclasses
 from pathlib import Path
 
 from getup_jax.motion.clips import MotionError
-from getup_jax.motion.io import asf_amc, bvh, composite_json, deepmimic
+from getup_jax.motion.io import asf_amc, bvh, composite_json, deepmimic, smpl
 from getup_jax.motion.io.guard import one_line
 from getup_jax.motion.io.recording import Recording
 from getup_jax.motion.io.text import decode, read_json
 
 SUFFIXES = (".bvh", ".txt", ".json", ".amc")
+NPZ = ".npz"  # a clip of this package, or a motion of SMPL
 
 
 @dataclasses.dataclass(frozen=True)
 class ReadOptions:
     """What files do not say about themselves."""
 
-    up: str = "auto"  # y | z: the vertical axis of BVH files; auto: as their skeleton shows
+    up: str = "auto"  # y | z: the vertical axis of BVH and SMPL files; auto: as they show
     allow_short: bool = False  # take BVH files that lack more than one row, or have too many
-    fps: float | None = None  # rate of BVH and AMC files, in place of what they say or leave out
+    fps: float | None = (
+        None  # rate of BVH, AMC and SMPL files, in place of what they say or leave out
+    )
 
 
 def read_motion(path: str | Path, options: ReadOptions = ReadOptions()) -> Recording:
@@ -44,12 +47,19 @@ def _read(path: Path, options: ReadOptions) -> Recording:
         return asf_amc.read_amc(path, options.fps or asf_amc.CMU_FPS)
     if suffix in (".txt", ".json"):
         return _read_json(path)
+    if suffix == NPZ:
+        return smpl.read_smpl(path, options.up, options.fps)
     raise MotionError(f"{path.name}: unknown format {suffix!r}; known are {', '.join(SUFFIXES)}")
+
+
+def is_clip(path: Path) -> bool:
+    """Whether a file is a clip that is on the character already, and is not read but loaded."""
+    return path.suffix.lower() == NPZ and not smpl.is_smpl(path)
 
 
 def motion_files(folder: Path) -> list[Path]:
     """The motion files below a folder, sorted; those that only look alike are left out."""
-    found = [file for file in folder.rglob("*") if file.suffix.lower() in (*SUFFIXES, ".npz")]
+    found = [file for file in folder.rglob("*") if file.suffix.lower() in (*SUFFIXES, NPZ)]
     return sorted(file for file in found if file.is_file() and not _is_other_text(file))
 
 

@@ -30,7 +30,7 @@ from getup_jax.physics.character import CharacterSpec
 # Code whose change makes other clips out of the same files.
 _CODE = (
     *("io/asf_amc", "io/bvh", "io/bvh_header", "io/bvh_rows", "io/composite_json"),
-    *("io/deepmimic", "io/readers", "io/recording", "io/text"),
+    *("io/deepmimic", "io/readers", "io/recording", "io/smpl", "io/text"),
     *("retarget/axes", "retarget/body", "retarget/bone_lengths", "retarget/calibrate"),
     *("retarget/identify", "retarget/ik_branches", "retarget/jacobian", "retarget/joint_names"),
     *("retarget/name_prefixes", "retarget/retarget", "retarget/solver", "retarget/targets"),

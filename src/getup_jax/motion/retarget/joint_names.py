@@ -52,10 +52,12 @@ def map_names(
     """{link: joint index} for the joints that are recognised, `user` first."""
     given = _user_links(joints, user or {})
     taken = set(given.values()) | {i for i, name in enumerate(joints) if name in (user or {})}
-    found = [
-        _add_trunk(*_recognised([_words(name) for name in names], dict(given), set(taken)), parents)
-        for names in without_prefix(joints, len(REQUIRED))
-    ]
+    found = []
+    for names in without_prefix(joints, len(REQUIRED)):
+        words = [_words(name) for name in names]
+        links, used = _recognised(words, dict(given), set(taken))
+        _prefer_upper(links, used, words, parents, given)
+        found.append(_add_trunk(links, used, parents))
     return max(found, key=len)  # the first of several, so that no prefix goes without a gain
 
 
@@ -81,6 +83,27 @@ def _recognised(
             found[f"arm_{side}"] = found.pop(f"shoulder_{side}")
             find(f"shoulder_{side}", side, _LIMBS["shoulder"])
     return found, taken
+
+
+def _prefer_upper(
+    found: dict[str, int],
+    taken: set[int],
+    words: Sequence[tuple[str, str]],
+    parents: Sequence[int],
+    given: Mapping[str, int],
+) -> None:
+    """Where an ankle carries a foot, as in SMPL, the foot's joint is the toes'; so for wrists."""
+    for link, upper, lower in (("foot", "ankle", "toe"), ("hand", "wrist", "")):
+        for side in "lr":
+            own, key = f"{link}_{side}", (side, upper)
+            joint = words.index(key) if key in words else -1
+            if own not in found or own in given or joint < 0 or joint in taken:
+                continue
+            if joint in _path(found[own], -1, parents)[:-1]:
+                if lower:
+                    found.setdefault(f"{lower}_{side}", found[own])
+                found[own] = joint
+                taken.add(joint)
 
 
 def require_links(source: str, joints: Sequence[str], found: Mapping[str, int]) -> None:

@@ -18,7 +18,7 @@ _LOOKS = 300  # frames that are looked at
 # The lowest joint stays on the floor: its height varies by less than the first, in leg lengths,
 # and what is no height by more than the second.
 _FLOOR, _NO_FLOOR = 0.2, 0.4
-_STANDS = 0.1  # share of the frames
+_STANDS, _MOSTLY = 0.1, 0.5  # shares of the frames
 
 
 def vertical_axis(recording: Recording) -> str | None:
@@ -31,6 +31,20 @@ def vertical_axis(recording: Recording) -> str | None:
     if upright and upright[0] in ("y", "z"):
         return upright[0]
     return _by_motion(_seen(recording), links, upright)
+
+
+def axis_of_motion(recording: Recording) -> str | None:
+    """As `vertical_axis`, where the zero pose has other axes than the world, by the motion alone.
+
+    The axis, y or z, along which the body stands at times, and of two the one along which its
+    lowest joint stays; -y or -z where it stands along that one most of the time.
+    """
+    links = map_names(recording.joint_names, recording.parents)
+    share, varies = _standing(_seen(recording), links)
+    stands = [name for name in ("z", "y") if share[name] > _STANDS]
+    if stands:
+        return min(stands, key=lambda name: varies[name])
+    return next((name for name in ("-y", "-z") if share[name] > _MOSTLY), None)
 
 
 def _is_human(rest: np.ndarray, links: Mapping[str, int], name: str) -> bool:
@@ -51,10 +65,12 @@ def _seen(recording: Recording) -> Recording:
     )
 
 
-def _by_motion(recording: Recording, links: Mapping[str, int], upright: list[str]) -> str | None:
-    """The axis along which the body stands on a floor, or is as in the zero pose.
+def _standing(
+    recording: Recording, links: Mapping[str, int]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """By axis: the share of frames that stand along it, and how much the lowest joint varies there.
 
-    A body that stays still may stand along one axis as well as lie along another.
+    The latter in leg lengths.
     """
     position, _ = forward(recording)
     feet, arms = (
@@ -67,9 +83,18 @@ def _by_motion(recording: Recording, links: Mapping[str, int], upright: list[str
     leg = max(float(leg_lengths(rest_positions(recording), links, "l").sum()), 1e-9)
     share, varies = {}, {}
     for name, (axis, sign) in _AXES.items():
-        share[name] = np.mean(sign * way[:, axis] > _ALONG)
+        share[name] = float(np.mean(sign * way[:, axis] > _ALONG))
         low, high = np.percentile((sign * body[..., axis]).min(axis=1), [5, 95])
-        varies[name] = (high - low) / leg
+        varies[name] = float(high - low) / leg
+    return share, varies
+
+
+def _by_motion(recording: Recording, links: Mapping[str, int], upright: list[str]) -> str | None:
+    """The axis along which the body stands on a floor, or is as in the zero pose.
+
+    A body that stays still may stand along one axis as well as lie along another.
+    """
+    share, varies = _standing(recording, links)
     for name in _AXES:
         other = "z" if name == "y" else "y"
         if share[name] > _STANDS and varies[name] < _FLOOR and varies[other] > _NO_FLOOR:
