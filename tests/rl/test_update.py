@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from getup_jax.rl.minibatch import (
     ACTOR_EPSILON,
     FIRST_SCALE,
+    Trainee,
     adapt_scale,
     first_scale,
     make_optimiser,
@@ -53,15 +54,33 @@ def test_updates_match_slow_adam(max_norm: float):
     rows = np.asarray(shuffled_minibatches(jax.random.key(0), 2, 40, 10))
     optimiser = make_optimiser(max_norm, jnp.asarray(0.1), ACTOR_EPSILON)
     start = jnp.zeros(())
-    parameter, state, metrics = run_minibatches(
-        _loss, optimiser, start, optimiser.init(start), jnp.asarray(x), jnp.asarray(rows)
-    )
+    trainee = Trainee(_loss, optimiser, start, optimiser.init(start), jnp.asarray(rows))
+    ((parameter, state, metrics),) = run_minibatches((trainee,), jnp.asarray(x))
     expected, error, norm = _slow_adam(0.0, x, rows, 0.1, max_norm)
     assert_allclose(parameter, expected, rtol=1e-4)
     assert_allclose(metrics["error"], error, rtol=1e-4)
     assert_allclose(metrics["gradient_norm"], norm, rtol=1e-4)
     fresh = make_optimiser(1.0, 0.0, ACTOR_EPSILON).init(start)
     assert jax.tree.structure(state) == jax.tree.structure(fresh)
+
+
+def test_side_by_side_each_learns_what_it_does_alone():
+    x = jnp.asarray(np.random.default_rng(0).normal(size=40), jnp.float32)
+    optimiser = make_optimiser(1.0, jnp.asarray(0.1), ACTOR_EPSILON)
+    trainees = [
+        Trainee(
+            _loss,
+            optimiser,
+            jnp.asarray(start),
+            optimiser.init(jnp.asarray(start)),
+            shuffled_minibatches(jax.random.key(epochs), epochs, 40, 10),
+        )
+        for start, epochs in ((0.0, 3), (5.0, 1), (-2.0, 2))
+    ]
+    together = run_minibatches(trainees, x)
+    for trainee, found in zip(trainees, together, strict=True):
+        (alone,) = run_minibatches((trainee,), x)
+        jax.tree.map(lambda a, b: assert_allclose(a, b, rtol=1e-6), found, alone)
 
 
 @pytest.mark.parametrize(

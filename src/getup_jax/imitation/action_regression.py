@@ -18,7 +18,7 @@ from getup_jax.envs.getup.task import GetUpTask, World
 from getup_jax.networks import gaussian
 from getup_jax.rl.actor_critic import normalized
 from getup_jax.rl.learner import Learner
-from getup_jax.rl.minibatch import Loss, run_minibatches, shuffled_minibatches
+from getup_jax.rl.minibatch import Loss, Trainee, run_minibatches, shuffled_minibatches
 from getup_jax.rl.rollout import rollout
 from getup_jax.rl.state import PolicyState
 
@@ -141,7 +141,8 @@ def regress(
     @jax.jit
     def epoch(carry: tuple[Any, Any], samples: Any, key: jax.Array) -> tuple[Any, Any]:
         order = shuffled_minibatches(key, 1, updates * size, size)
-        return run_minibatches(loss, optimiser, *carry, samples, order)[:2]
+        ((*carry, _),) = run_minibatches((Trainee(loss, optimiser, *carry, order),), samples)
+        return carry[0], carry[1]
 
     carry = (parameters, optimiser.init(parameters))
     samples = jax.tree.map(jnp.asarray, samples)

@@ -17,7 +17,7 @@ from getup_jax.core import device_axis
 from getup_jax.networks.mlp import dense_layers
 from getup_jax.networks.recurrent import GRU
 from getup_jax.rl import normalize
-from getup_jax.rl.minibatch import run_minibatches, shuffled_minibatches
+from getup_jax.rl.minibatch import Trainee, run_minibatches, shuffled_minibatches
 from getup_jax.rl.normalize import Moments
 
 
@@ -90,9 +90,8 @@ class Discriminator:
         )
         size = device_axis.part(self.config.minibatch_size)
         rows = shuffled_minibatches(key_order, 1, len(fake), size)
-        variables, optimiser, metrics = run_minibatches(
-            self._loss, self._optimiser(), state.variables, state.optimiser, pairs, rows
-        )
+        trainee = Trainee(self._loss, self._optimiser(), state.variables, state.optimiser, rows)
+        ((variables, optimiser, metrics),) = run_minibatches((trainee,), pairs)
         return DiscriminatorState(variables, optimiser, statistics), metrics
 
     def score(self, state: DiscriminatorState, windows: jax.Array) -> jax.Array:

@@ -191,13 +191,16 @@ class Learner:
         """The learner after all updates of critic and actor."""
         improver, std = self.improver, stage.action_std
         metrics = {"ppo/gradient_cosine": self._cosine(iteration, learner, samples, std)}
-        improved, of_actor = improver.actor(learner, samples, stage.learning_rate, std, key)
+        rates = stage.learning_rate, stage.critic_learning_rate
+        acted, valued, of_updates = improver.update(learner, samples, rates, std, key)
         if self.config.critic_first > 0:
             # A policy that was trained before meets a critic that knows nothing yet.
-            improved = _select(iteration < self.config.critic_first, learner, improved)
-        improved, of_critic = improver.critic(improved, samples, stage.critic_learning_rate, key)
+            acted = _select(iteration < self.config.critic_first, learner, acted)
+        improved = dataclasses.replace(
+            acted, critic=valued.critic, critic_optimiser=valued.critic_optimiser
+        )
         improved = _unless_first(learner, self._averaged(iteration, improved))
-        return improved, metrics | of_actor | of_critic
+        return improved, metrics | of_updates
 
     def _cosine(
         self, iteration: jax.Array, learner: LearnerState, samples: ppo.Samples, std: jax.Array

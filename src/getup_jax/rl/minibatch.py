@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -51,45 +52,66 @@ def shuffled_minibatches(
     return order.reshape(-1, minibatch_size)
 
 
-def run_minibatches(
-    loss: Loss,
-    optimiser: optax.GradientTransformation,
-    parameters: Any,
-    optimiser_state: Any,
-    samples: Any,
-    minibatches: jax.Array,
-) -> tuple[Any, Any, dict[str, jax.Array]]:
-    """One gradient step for every row of `minibatches`.
+class Trainee(NamedTuple):
+    """Parameters that learn from minibatches of some samples."""
+
+    loss: Loss  # of the parameters on a minibatch, with metrics
+    optimiser: optax.GradientTransformation  # see `make_optimiser`
+    parameters: Any  # pytree
+    optimiser_state: Any  # of the parameters
+    minibatches: jax.Array  # [U, M] int32, sample numbers of U updates
+
+
+# parameters, optimiser state, and the means over all updates of the metrics and of `gradient_norm`,
+# before it was limited
+Trained = tuple[Any, Any, dict[str, jax.Array]]
+
+
+def run_minibatches(trainees: Sequence[Trainee], samples: Any) -> list[Trained]:
+    """One gradient step for every row of each trainee's minibatches of samples, pytree [N, ...].
 
     On several devices each has its own samples and a part of every minibatch; the gradient is the
-    mean over the devices, so that all make the same step.
-
-    Args:
-        loss: of the parameters on a minibatch, with metrics.
-        optimiser: see `make_optimiser`.
-        parameters: pytree.
-        optimiser_state: of the parameters.
-        samples: pytree of [N, ...].
-        minibatches: [U, M] int32, sample numbers of U updates.
-
-    Returns:
-        Parameters, optimiser state, and the means over all updates of the metrics and of
-        `gradient_norm`, before it was limited.
+    mean over the devices, so that all make the same step. Trainees learn nothing from each other,
+    but step side by side, so that their gradients are one message between the devices.
     """
+    carries = [(trainee.parameters, trainee.optimiser_state) for trainee in trainees]
+    found: list[list[dict[str, jax.Array]]] = [[] for _ in trainees]
+    done = 0
+    for end in sorted({len(trainee.minibatches) for trainee in trainees}):
+        going = [i for i, trainee in enumerate(trainees) if len(trainee.minibatches) >= end]
+        some = [trainees[i] for i in going]
+        rows = [trainee.minibatches[done:end] for trainee in some]
+        step = functools.partial(_step, some, samples)
+        moved, metrics = jax.lax.scan(step, [carries[i] for i in going], rows)
+        for i, carry, of_steps in zip(going, moved, metrics, strict=True):
+            carries[i] = carry
+            found[i].append(of_steps)
+        done = end
+    whole = [jax.tree.map(lambda *x: jnp.mean(jnp.concatenate(x)), *parts) for parts in found]
+    whole = device_axis.averaged(whole)
+    return [(*carry, metrics) for carry, metrics in zip(carries, whole, strict=True)]
 
-    def minibatch_update(carry: tuple[Any, Any], rows: jax.Array):
-        parameters, optimiser_state = carry
-        minibatch = jax.tree.map(lambda x: x[rows], samples)
-        gradient, metrics = jax.grad(loss, has_aux=True)(parameters, minibatch)
-        gradient = device_axis.averaged(gradient)
-        updates, optimiser_state = optimiser.update(gradient, optimiser_state, parameters)
-        metrics = {**metrics, "gradient_norm": optax.tree.norm(gradient)}
-        return (optax.apply_updates(parameters, updates), optimiser_state), metrics
 
-    carry = (parameters, optimiser_state)
-    (parameters, optimiser_state), metrics = jax.lax.scan(minibatch_update, carry, minibatches)
-    metrics = device_axis.averaged(jax.tree.map(jnp.mean, metrics))
-    return parameters, optimiser_state, metrics
+def _step(
+    trainees: Sequence[Trainee],
+    samples: Any,
+    carries: list[tuple[Any, Any]],
+    rows: list[jax.Array],
+) -> tuple[list[tuple[Any, Any]], list[dict[str, jax.Array]]]:
+    """One update of each."""
+    found = [
+        jax.grad(trainee.loss, has_aux=True)(parameters, jax.tree.map(lambda x, r=r: x[r], samples))
+        for trainee, (parameters, _), r in zip(trainees, carries, rows, strict=True)
+    ]
+    gradients = device_axis.averaged([gradient for gradient, _ in found])
+    moved, metrics = [], []
+    for trainee, (parameters, state), gradient, (_, of_loss) in zip(
+        trainees, carries, gradients, found, strict=True
+    ):
+        updates, state = trainee.optimiser.update(gradient, state, parameters)
+        moved.append((optax.apply_updates(parameters, updates), state))
+        metrics.append({**of_loss, "gradient_norm": optax.tree.norm(gradient)})
+    return moved, metrics
 
 
 def adapt_scale(scale: jax.Array, clip_fraction: jax.Array, target: float | None) -> jax.Array:

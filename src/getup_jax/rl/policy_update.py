@@ -20,6 +20,7 @@ from getup_jax.rl.actor_critic import ActorCritic
 from getup_jax.rl.minibatch import (
     ACTOR_EPSILON,
     CRITIC_EPSILON,
+    Trainee,
     adapt_scale,
     make_optimiser,
     run_minibatches,
@@ -41,53 +42,58 @@ class Improver:
     config: PPOConfig
     weights: tuple[float, ...]  # [K] of the objectives, their sum is 1
 
-    def actor(
+    def update(
         self,
         learner: LearnerState,
         samples: ppo.Samples,
-        rate: jax.Array,
+        rates: tuple[jax.Array, jax.Array],
         std: jax.Array,
         key: jax.Array,
-    ) -> tuple[LearnerState, Metrics]:
-        """The learner after the actor's epochs, with the next iteration's scale of its rate."""
+    ) -> tuple[LearnerState, LearnerState, Metrics]:
+        """The learner after the actor's epochs, and the learner after the critic's, apart.
+
+        rates: learning rates of actor and critic. The first has the actor's next scale of its rate.
+        """
+        trainees = (
+            self._actor(learner, rates[0], std, key),
+            self._critic(learner, rates[1], jax.random.fold_in(key, _CRITIC)),
+        )
+        (actor, of_actor, metrics), (critic, of_critic, more) = run_minibatches(trainees, samples)
+        metrics["ppo/gradient_norm"] = metrics.pop("gradient_norm")
+        metrics["ppo/critic_gradient_norm"] = more.pop("gradient_norm")
+        target = self.config.target_clip_fraction
+        acted = dataclasses.replace(
+            learner,
+            policy=dataclasses.replace(learner.policy, actor=actor),
+            actor_optimiser=of_actor,
+            learning_rate_scale=adapt_scale(
+                learner.learning_rate_scale, metrics["ppo/clip_fraction"], target
+            ),
+        )
+        valued = dataclasses.replace(learner, critic=critic, critic_optimiser=of_critic)
+        return acted, valued, metrics | more
+
+    def _actor(
+        self, learner: LearnerState, rate: jax.Array, std: jax.Array, key: jax.Array
+    ) -> Trainee:
         config = self.config
-
-        def loss(actor: Any, minibatch: ppo.Samples) -> tuple[jax.Array, Metrics]:
-            return self.actor_loss(actor, minibatch, std)
-
-        actor, optimiser, metrics = run_minibatches(
-            loss,
+        return Trainee(
+            lambda actor, minibatch: self.actor_loss(actor, minibatch, std),
             make_optimiser(config.max_gradient_norm, rate, ACTOR_EPSILON),
             learner.policy.actor,
             learner.actor_optimiser,
-            samples,
             self._minibatches(key, config.epochs),
         )
-        metrics["ppo/gradient_norm"] = metrics.pop("gradient_norm")
-        scale = adapt_scale(
-            learner.learning_rate_scale, metrics["ppo/clip_fraction"], config.target_clip_fraction
-        )
-        policy = dataclasses.replace(learner.policy, actor=actor)
-        learner = dataclasses.replace(
-            learner, policy=policy, actor_optimiser=optimiser, learning_rate_scale=scale
-        )
-        return learner, metrics
 
-    def critic(
-        self, learner: LearnerState, samples: ppo.Samples, rate: jax.Array, key: jax.Array
-    ) -> tuple[LearnerState, Metrics]:
-        """The learner after the critic's epochs."""
+    def _critic(self, learner: LearnerState, rate: jax.Array, key: jax.Array) -> Trainee:
         config = self.config
-        critic, optimiser, metrics = run_minibatches(
+        return Trainee(
             self.critic_loss,
             make_optimiser(config.critic_gradient_norm, rate, CRITIC_EPSILON),
             learner.critic,
             learner.critic_optimiser,
-            samples,
-            self._minibatches(jax.random.fold_in(key, _CRITIC), config.critic_epochs),
+            self._minibatches(key, config.critic_epochs),
         )
-        metrics["ppo/critic_gradient_norm"] = metrics.pop("gradient_norm")
-        return dataclasses.replace(learner, critic=critic, critic_optimiser=optimiser), metrics
 
     def actor_loss(
         self, actor: Any, samples: ppo.Samples, std: jax.Array
