@@ -149,10 +149,12 @@ def report(about: dict[str, Any], seconds: dict[str, list[float]]) -> dict[str, 
         name: statistics.median(a / b for a, b in zip(rates[x], rates[y], strict=True))
         for name, (x, y) in RATIOS.items()
     }
+    sizes, updates = about["one"]["parameters"], about["one"]["updates"]
+    messages = max(updates.values())  # one has both gradients, while both learn
     of_one = Iteration(
         compute_s=statistics.median(seconds["one"]),
-        gradient_bytes=4 * statistics.mean(about["one"]["parameters"].values()),
-        updates=sum(about["one"]["updates"].values()),
+        gradient_bytes=4 * sum(size * updates[part] for part, size in sizes.items()) / messages,
+        updates=messages,
     )
     return {
         "control steps/s": {name: statistics.median(found) for name, found in rates.items()},
@@ -178,7 +180,7 @@ def show(result: dict[str, Any]) -> None:
         console.print(f"{name}: {' / '.join(RATIOS[name])} = {ratio:.2f}")
     found = result["iteration"]
     console.print(
-        f"an iteration: {found['compute_s']:.2f} s alone, {found['updates']} gradients of "
+        f"an iteration: {found['compute_s']:.2f} s alone, {found['updates']} messages of "
         f"{found['gradient_bytes'] / 1e6:.2f} MB; a reduction of the largest takes "
         f"{1e3 * result['reduction_s']:.2f} ms, of one number "
         f"{1e3 * result['smallest_reduction_s']:.2f} ms"

@@ -19,8 +19,8 @@ class Iteration:
     """One device's part of a training iteration."""
 
     compute_s: float  # with nobody to wait for
-    gradient_bytes: float  # of one update, on average over actor's and critic's
-    updates: int  # gradients that are reduced
+    gradient_bytes: float  # of a message, on average: the actor's gradient and the critic's
+    updates: int  # messages with gradients
 
 
 def reduction_s(size: float, devices: int, network: Network) -> float:

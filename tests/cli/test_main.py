@@ -162,6 +162,7 @@ def test_eval_passes_its_arguments_on(monkeypatch):
     )
     default |= {"size": (720, 1280)}
     default |= {"terrain_seed": None, "motions": None, "script": None, "drops": None}
+    default |= {"ground": None}
     assert vars(seen[0]) == default
     assert vars(seen[1]) == default | {
         "ckpt": "runs/a",

@@ -188,7 +188,7 @@ def observed(policy: PolicyState, learner: Learner, seed: int = 0) -> PolicyStat
     return observe(policy, seen, learner.model.symmetry)
 
 
-@pytest.mark.parametrize("was_mirrored", [False, True])
+@pytest.mark.parametrize("was_mirrored", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_policy_is_distilled_into_networks_with_and_without_mirror_images(
     mirrored, was_mirrored, monkeypatch
 ):

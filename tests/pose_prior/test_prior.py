@@ -6,17 +6,33 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from flax import serialization
-from pose_samples import QUICK, pose_set, quick_prior
+from pose_samples import QUICK, character, manifold_poses, pose_set, quick_prior
 
 from getup_jax.pose_prior import prior as pose_prior
+from getup_jax.pose_prior import report as prior_report
 from getup_jax.pose_prior.cvae import CVAE
 from getup_jax.pose_prior.prior import MIN_LATENT_STD, PosePrior
-from getup_jax.pose_prior.training import train_prior
+from getup_jax.pose_prior.training import limit_check, train_prior
 
 
 def sample(rows: slice = slice(0, 200)) -> tuple[jax.Array, jax.Array]:
     poses = pose_set()
     return jnp.asarray(poses.angles[rows]), jnp.asarray(poses.condition[rows])
+
+
+def test_a_two_dimensional_manifold_is_learned():
+    _, report = quick_prior()
+    assert report.heldout_rmse_deg < 3.0
+    assert report.heldout_rmse_deg == pytest.approx(report.train_rmse_deg, rel=0.5)
+    spread = np.degrees(np.sqrt(np.mean(pose_set().angles.var(axis=0))))
+    assert spread > 20  # degrees: what predicting the mean pose would be off
+
+
+def test_small_sets_get_more_epochs_until_enough_updates():
+    _, report = quick_prior()
+    per_epoch = report.num_poses // QUICK.batch_size
+    assert report.epochs == -(-QUICK.min_updates // per_epoch)
+    assert report.updates == report.epochs * per_epoch
 
 
 def test_decode_inverts_encode():
@@ -100,3 +116,25 @@ def test_works_as_an_argument_of_jit_and_over_leading_axes():
     )
     rows = [pose_prior.decode(prior, *row) for row in zip(latent, condition, strict=True)]
     np.testing.assert_allclose(batched.reshape(6, -1), np.stack(rows), atol=1e-5)
+
+
+def test_limit_check_counts_angles_and_poses():
+    prior, _ = quick_prior()
+    lower, upper = np.asarray(prior.joint_lower), np.asarray(prior.joint_upper)
+    angles = np.tile(0.5 * (lower + upper), (4, 1))
+    angles[0, :2] = upper[:2] + 0.2
+    checked = limit_check(prior, jnp.asarray(angles))
+    assert checked["random_poses_outside"] == 0.25
+    assert checked["random_angles_outside"] == pytest.approx(2 / angles.size)
+    assert checked["random_worst_deg"] == pytest.approx(np.degrees(0.2), rel=1e-4)
+
+
+def test_an_evaluation_of_the_quick_prior():
+    prior, _ = quick_prior()
+    result = prior_report.evaluate_prior(prior, manifold_poses(50), character())
+    assert result.num_poses == 50
+    assert result.rmse_deg < 3.0
+    assert result.feature_error.height_m < 0.05
+    assert result.decoded_penetration.share_deep == pytest.approx(
+        result.data_penetration.share_deep, abs=0.2
+    )

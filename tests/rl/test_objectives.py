@@ -7,7 +7,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from probes import Probe, make_world
 from tiny_composite import COMPOSITE, CONFIG, tiny_composite
 
 from getup_jax.config import NetworkConfig, PPOConfig
@@ -18,6 +17,7 @@ from getup_jax.envs.composite.discriminator_rewards import (
 from getup_jax.physics.character import load_character
 from getup_jax.rl.discriminator import Discriminator
 from getup_jax.rl.learner import Learner, make_learner
+from probes import Probe, make_world
 
 # what users run: with the quick options of conftest.py two programs may round differently
 AS_USERS = {"xla_backend_optimization_level": 3, "xla_cpu_use_fusion_emitters": True}
@@ -50,7 +50,7 @@ def plain():
     return _train(make_learner(Probe(), NETWORK, PROBE_PPO, 10_000))
 
 
-@pytest.mark.parametrize("separate", [True, False])
+@pytest.mark.parametrize("separate", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_one_objective_with_one_reward_is_plain_ppo_bit_for_bit(plain, separate: bool):
     rewards = _objectives(separate)
     composite = make_learner(Probe(), NETWORK, PROBE_PPO, 10_000, reward_model=rewards)

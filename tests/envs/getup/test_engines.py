@@ -7,6 +7,7 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from tiny_task import CONFIG, tiny_task
 
 from compiled import first_policy
@@ -15,6 +16,7 @@ from getup_jax.networks.mlp import OUTPUT_LAYER
 from getup_jax.rl.learner import make_learner
 
 
+@pytest.mark.slow  # tests/physics/test_mjx.py compares the engines themselves
 def test_a_policys_first_actions_are_the_same_on_native_and_mjx(character, built):
     physics = dataclasses.replace(CONFIG.physics, engine="mjx")
     other = tiny_task(character, dataclasses.replace(CONFIG, physics=physics))
