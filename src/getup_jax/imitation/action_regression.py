@@ -141,8 +141,8 @@ def regress(
     @jax.jit
     def epoch(carry: tuple[Any, Any], samples: Any, key: jax.Array) -> tuple[Any, Any]:
         order = shuffled_minibatches(key, 1, updates * size, size)
-        ((*carry, _),) = run_minibatches((Trainee(loss, optimiser, *carry, order),), samples)
-        return carry[0], carry[1]
+        (trained,) = run_minibatches((Trainee(loss, optimiser, *carry, order),), samples)
+        return trained[:2]
 
     carry = (parameters, optimiser.init(parameters))
     samples = jax.tree.map(jnp.asarray, samples)
