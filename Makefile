@@ -55,5 +55,6 @@ $(STAMP): pyproject.toml
 	       "on Debian and Ubuntu: apt install python3-venv" >&2; \
 	  exit 1; }
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet -e '.[dev]' $(if $(JAX),'jax[$(JAX)]')
 	@touch $@

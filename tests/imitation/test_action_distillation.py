@@ -257,6 +257,7 @@ def without_prior(task: BuiltTask) -> BuiltTask:
     return BuiltTask(env, task.world.replace(prior=None), None, task.getups)
 
 
+@pytest.mark.slow
 def test_a_policy_without_a_prior_is_taught_as_well(tmp_path, mirrored, monkeypatch):
     quickly(monkeypatch)
     bare, config = without_prior(mirrored), dataclasses.replace(CONFIG, prior=None)

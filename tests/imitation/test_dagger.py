@@ -111,6 +111,7 @@ def test_targets_of_an_arc_lie_to_its_side():
     assert alone.max() > 3.0
 
 
+@pytest.mark.slow
 def test_over_a_meta_policy_only_the_new_clips_are_learned(built, monkeypatch, tmp_path):
     monkeypatch.setattr(dagger, "_MINIBATCH", 16)
     monkeypatch.setattr(dagger, "_ROUNDS", 2)

@@ -77,6 +77,7 @@ def test_another_batch_takes_over_the_curriculum_and_what_is_learned(tmp_path, m
         with_shared(other, to_nested(eight), "run")
 
 
+@pytest.mark.slow
 def test_without_a_pose_prior_the_action_is_the_servo_target():
     config = changed(SETTINGS, offset_scale=0.5)
     task, learner = build(config, prior=False)

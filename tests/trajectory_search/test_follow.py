@@ -62,6 +62,7 @@ def test_the_way_to_one_of_the_last_goes_back_through_its_parents():
     np.testing.assert_array_equal(follow._way_to(2, history).time, [2.0, 10.0, 22.0])
 
 
+@pytest.mark.slow
 def test_the_search_follows_a_curve_more_closely_than_a_policy_that_knows_nothing(built):
     size = built.environment.action_size
 
