@@ -56,7 +56,7 @@ def main() -> None:
             for name in args.peers:
                 print(f"{name}: starting ...", flush=True)
                 peers[name] = Peer(name, setting_of(name, args, config, folder))
-            there = {name: peer for name, peer in peers.items() if peer.missing is None}
+            there = _left(peers)
             if args.success is None:
                 rounds = WARM_UP + args.rounds
                 for number in range(rounds):
@@ -105,14 +105,17 @@ class Peer:
         self._process = _started(name, setting)
         answer = self._answer()
         self.ready_s = time.monotonic() - begin
-        self.missing = answer.get("missing")
+        if answer is not None and "missing" in answer:
+            self.missing = f"not installed: {answer['missing']}"
 
     def iterate(self) -> None:
-        """One training iteration."""
+        """One training iteration; where it breaks, `missing` says so."""
         assert self._process.stdin is not None
         self._process.stdin.write("go\n")
         self._process.stdin.flush()
-        self.iterations.append(self._answer())
+        answer = self._answer()
+        if answer is not None:
+            self.iterations.append(answer)
 
     @property
     def seconds(self) -> float:
@@ -133,18 +136,29 @@ class Peer:
             self._process.kill()
             self._process.wait()
 
-    def _answer(self) -> dict[str, Any]:
+    def _answer(self) -> dict[str, Any] | None:
+        """What the process says; None where it has ended, and `missing` is set."""
         assert self._process.stdout is not None
         for line in self._process.stdout:
             if line.startswith("{"):
                 return json.loads(line)
         code = self._process.wait()
-        raise ConfigError(f"{self.name}: ended with code {code}; its message is above")
+        if self.name == OURS:
+            raise ConfigError(f"{self.name}: ended with code {code}; its message is above")
+        self.missing = f"ended with code {code}; its message is above"
+        print(f"{self.name}: {self.missing}", flush=True)
+        return None
+
+
+def _left(peers: dict[str, Peer]) -> dict[str, Peer]:
+    return {name: peer for name, peer in peers.items() if peer.missing is None}
 
 
 def _round(peers: dict[str, Peer], text: str) -> None:
-    for name, peer in peers.items():
+    for name, peer in _left(peers).items():
         peer.iterate()
+        if peer.missing is not None:
+            continue
         last = peer.iterations[-1]
         print(f"{text}: {name} {last['samples'] / last['seconds']:,.0f} samples/s", flush=True)
 
@@ -155,6 +169,9 @@ def reach(peers: dict[str, Peer], share: float, limit_s: float) -> None:
     while waiting:
         for name, peer in list(waiting.items()):
             peer.iterate()
+            if peer.missing is not None:
+                del waiting[name]
+                continue
             success = peer.iterations[-1]["success"]
             done = success is not None and success >= share
             if done or peer.seconds > limit_s:
@@ -208,7 +225,7 @@ def show(result: dict[str, Any]) -> None:
     )
     for name, row in peers.items():
         if "missing" in row:
-            table.add_row(name, f"not installed: {row['missing']}")
+            table.add_row(name, row["missing"])
             continue
         label = f"{name} (best)" if name == best else name
         if row.get("reached") is False:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -57,6 +58,30 @@ def test_who_reaches_the_share_stops_and_who_is_late_gives_up(capsys):
     rows = peers.report(args("--success", "0.9"), found)["peers"]
     assert (rows["fast"]["reached"], rows["slow"]["reached"]) == (True, False)
     assert (rows["fast"]["seconds"], rows["fast"]["samples"]) == (50.0, 20)
+
+
+LINES = {"lasts": 3, "breaks": 1, "never starts": 0}  # that a process says before it ends
+
+
+def test_a_peer_that_breaks_is_a_line_and_the_others_go_on(monkeypatch, capsys):
+    def started(name: str, setting: dict) -> subprocess.Popen[str]:
+        text = json.dumps({"samples": 10, "seconds": 1.0, "success": None})
+        script = "".join(f"print({text!r}, flush=True); input();" for _ in range(LINES[name]))
+        pipe = subprocess.PIPE
+        return subprocess.Popen([sys.executable, "-c", script], stdin=pipe, stdout=pipe, text=True)
+
+    monkeypatch.setattr(peers, "_started", started)
+    found = {name: peers.Peer(name, {}) for name in LINES}
+    for _ in range(2):
+        peers._round(peers._left(found), "round")
+    for one in found.values():
+        one.close()
+    rows = peers.report(args(), found)["peers"]
+    assert rows["lasts"]["samples_per_s"] == 10.0
+    assert rows["breaks"] == {"missing": "ended with code 0; its message is above"}
+    assert rows["never starts"] == rows["breaks"]
+    peers.show({"peers": rows})
+    assert capsys.readouterr().out.count("ended with code 0") == 4  # when it ends, and in the table
 
 
 def test_sizes_are_the_configs_but_for_the_length_of_slow_rollouts():
