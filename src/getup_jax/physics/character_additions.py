@@ -20,6 +20,7 @@ import numpy as np
 from getup_jax.config import ConfigError
 from getup_jax.config.check import require, shown
 from getup_jax.config.registry import check_name
+from getup_jax.physics.requirements import lowest_of_box
 
 ADDITIONS = ("add", "servos", "neutral")
 _OTHERS = "others"
@@ -113,12 +114,9 @@ def _add_neutral(spec: mujoco.MjSpec, content: Any, where: str) -> None:
 
 
 def _lowest(model: mujoco.MjModel, data: mujoco.MjData, name: str) -> float:
-    """Height (m) of the lowest corner of a box; 0 where there is none, which is said later."""
+    """That of a box by its name; 0 where there is none, which is said later."""
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
-    if index < 0:
-        return 0.0
-    up = np.abs(data.geom_xmat[index].reshape(3, 3)[2])
-    return float(data.geom_xpos[index][2] - up @ model.geom_size[index])
+    return 0.0 if index < 0 else lowest_of_box(model, data, index)
 
 
 def _hinges(spec: mujoco.MjSpec) -> dict[str, str]:

@@ -66,9 +66,7 @@ def _warn_of_soles(model: mujoco.MjModel, where: str) -> None:
     data.qpos[:] = model.key("neutral").qpos
     mujoco.mj_kinematics(model, data)
     for name in (f"foot_{side}" for side in _SIDES):
-        geom = model.geom(name).id
-        reach = np.abs(data.geom_xmat[geom].reshape(3, 3)[2]) @ model.geom_size[geom]
-        sole = data.geom_xpos[geom, 2] - reach
+        sole = lowest_of_box(model, data, model.geom(name).id)
         if abs(sole) > _SOLE_GAP_M:
             warnings.warn(
                 f"{where}: keyframe 'neutral': expected both soles on z = 0, got {name!r} at "
@@ -76,6 +74,12 @@ def _warn_of_soles(model: mujoco.MjModel, where: str) -> None:
                 stacklevel=4,
             )
             return
+
+
+def lowest_of_box(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
+    """Height (m) of the lowest corner of a box, by its number."""
+    up = np.abs(data.geom_xmat[geom].reshape(3, 3)[2])
+    return float(data.geom_xpos[geom][2] - up @ model.geom_size[geom])
 
 
 def _check_layout(model: mujoco.MjModel, where: str) -> None:

@@ -62,7 +62,14 @@ def num_iterations(config: Config) -> int:
 class Loop:
     """A run's state between two iterations, and what is done with it there."""
 
-    def __init__(self, config: Config, folder: Path, job: Job, display: Display) -> None:
+    def __init__(
+        self,
+        config: Config,
+        folder: Path,
+        job: Job,
+        display: Display,
+        start: checkpoint.LoadedPolicy | None = None,  # of `train.init_from`
+    ) -> None:
         self._config, self._job, self._display = config, job, display
         self._checkpoints = folder / checkpoint.CHECKPOINTS
         self._world = jax.device_put(job.world)
@@ -71,8 +78,8 @@ class Loop:
         self.saved: Path | None = None  # newest checkpoint
         if checkpoint.steps(self._checkpoints):
             self._restore()
-        elif config.train.init_from is not None:
-            self._load_policy(config.train.init_from)
+        elif start is not None:
+            self._take_over(start)
         elif job.prepare is not None:
             learner = self._state.learner
             self._begin_with(job.prepare(learner.policy, display.log), learner.valuation)
@@ -107,11 +114,10 @@ class Loop:
         self._display.log(f"resuming from {restored.path} at {count(self.steps)} steps")
         warn_if_other(restored.path, restored.metadata, self._job.body, self._display.log)
 
-    def _load_policy(self, path: str) -> None:
-        loaded = checkpoint.load_policy(path)
+    def _take_over(self, loaded: checkpoint.LoadedPolicy) -> None:
         self._display.log(f"starting with the policy of {loaded.path}")
         if self._config.train.init_learner:
-            self._load_learner(path)
+            self._load_learner(str(self._config.train.init_from))
         policy = self._state.learner.policy  # fresh, or not the average of its weights
         if self._job.carry_over is not None:
             policy = self._job.carry_over(policy, loaded, self._display.log)

@@ -152,12 +152,12 @@ def run(
         # what is wrong is said now rather than after minutes of compiling
         if config.train.tensorboard:
             tensorboard_module()
-        if not checkpoint.steps(folder / checkpoint.CHECKPOINTS):
-            _check_policies(config, display.log)
+        fresh = not checkpoint.steps(folder / checkpoint.CHECKPOINTS)
+        start = _policy_to_begin_with(config, display.log) if fresh else None
         wandb = _wandb(folder, config)
         begin = time.monotonic()
         display.log(f"building the task ({described()}) ...")
-        loop = Loop(config, folder, build(config, display.log), display)
+        loop = Loop(config, folder, build(config, display.log), display, start)
         with _writer(folder, loop, config, wandb) as writer, stop.armed():
             loop.train(writer, stop)
         display.close()
@@ -179,16 +179,18 @@ def _writer(folder: Path, loop: Loop, config: Config, wandb: WandbLog | None) ->
     return contextlib.nullcontext(NoMetrics())
 
 
-def _check_policies(config: Config, log: Log) -> None:
-    """Read what the run begins with and its meta policy; say if the first knows another body."""
+def _policy_to_begin_with(config: Config, log: Log) -> LoadedPolicy | None:
+    """That of `train.init_from`, with a line if it knows another body; checks the meta policy."""
     composite = config.composite
     if composite is not None and composite.meta is not None:
         checkpoint.load_policy(composite.meta)
-    if config.train.init_from is not None:
-        start = checkpoint.load_policy(config.train.init_from)
-        held = None if composite is None else equipment_of(composite.goals)
-        body = body_digest(load_character(config.physics, equipment=held).model)
-        warn_if_other(start.path, start.metadata, body, log)
+    if config.train.init_from is None:
+        return None
+    start = checkpoint.load_policy(config.train.init_from)
+    held = None if composite is None else equipment_of(composite.goals)
+    body = body_digest(load_character(config.physics, equipment=held).model)
+    warn_if_other(start.path, start.metadata, body, log)
+    return start
 
 
 def _finished(folder: Path, config: Config) -> bool:
