@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import reprlib
+from collections.abc import Iterable
 from typing import Any
 
 _LARGE = 10**15  # whole numbers from here on are shown by their first digits
@@ -16,6 +18,12 @@ def require(ok: bool, key: str, expected: str, got: object) -> None:
     """Raise ConfigError unless ok."""
     if not ok:
         raise ConfigError(f"{key}: expected {expected}, got {shown(got)}")
+
+
+def did_you_mean(name: str, known: Iterable[str], before: str = "") -> str:
+    """`before` and the known name that is most like it, as a question; empty where none is."""
+    close = difflib.get_close_matches(name, list(known), n=1)
+    return f"{before}did you mean {close[0]!r}?" if close else ""
 
 
 def shown(value: Any) -> str:

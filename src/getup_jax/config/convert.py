@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import types
 import typing
@@ -11,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from getup_jax.config import ConfigError
-from getup_jax.config.check import shown
+from getup_jax.config.check import did_you_mean, shown
 from getup_jax.config.ranges import Range, check_values, field_types, range_of
 
 _LONGEST = 80  # letters that an error text shows of an unknown key
@@ -69,8 +68,7 @@ def _cut(name: object) -> str:
 
 
 def _suggest(name: object, known: Mapping[str, Any]) -> str:
-    close = difflib.get_close_matches(_cut(name), known, n=1)
-    return f"did you mean {close[0]!r}?" if close else f"known keys are: {', '.join(known)}"
+    return did_you_mean(_cut(name), known) or f"known keys are: {', '.join(known)}"
 
 
 def _convert(value: Any, hint: Any, key: str, default: Any, allowed: Range | None) -> Any:

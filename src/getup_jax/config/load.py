@@ -8,7 +8,6 @@ it as text.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import functools
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import Any
 import yaml
 
 from getup_jax.config import Config, ConfigError, yaml_text
-from getup_jax.config.check import shown
+from getup_jax.config.check import did_you_mean, shown
 from getup_jax.config.convert import Text, describe, section
 from getup_jax.config.migration import migrated, refuse_old
 from getup_jax.core.resources import config_path, shipped_configs
@@ -78,10 +77,9 @@ def find_config(path: str | Path) -> Path:
         kind = "a folder" if Path(path).is_dir() else "no regular file"
         raise ConfigError(f"{path}: is {kind}; expected a YAML file, or a shipped config's name")
     shipped = shipped_configs()
-    close = difflib.get_close_matches(Path(path).stem, shipped, n=1)
-    hint = f"did you mean {close[0]!r}? " if close else ""
+    hint = did_you_mean(Path(path).stem, shipped, "; ")
     raise ConfigError(
-        f"{path}: no such config file; {hint}the shipped configs are: {', '.join(shipped)}"
+        f"{path}: no such config file{hint or ';'} the shipped configs are: {', '.join(shipped)}"
     )
 
 

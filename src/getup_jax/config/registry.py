@@ -10,12 +10,11 @@ is known to every command as soon as it is installed.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping
 from importlib.metadata import entry_points
 from typing import Any, TypeVar
 
-from getup_jax.config.check import ConfigError
+from getup_jax.config.check import ConfigError, did_you_mean
 
 T = TypeVar("T")
 
@@ -70,6 +69,5 @@ def _loaded(point: Any) -> Any:
 def check_name(name: str, known: tuple[str, ...], key: str) -> None:
     """Raises ConfigError with a suggestion where a name is not known."""
     if name not in known:
-        close = difflib.get_close_matches(name, known, n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
+        hint = did_you_mean(name, known, "; ")
         raise ConfigError(f"{key}: unknown {name!r}{hint}; known: {', '.join(known) or 'none'}")

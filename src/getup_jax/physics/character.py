@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import mujoco
 import numpy as np
 
 from getup_jax.config import ConfigError, PhysicsConfig
+from getup_jax.config.check import did_you_mean
 from getup_jax.core.resources import asset_path
 from getup_jax.physics.character_map import SUFFIX, read_mapped
 from getup_jax.physics.props import Equipment, add_balls, add_racket
@@ -200,6 +200,5 @@ def _mirror_table(model: mujoco.MjModel, names: tuple[str, ...]) -> tuple[np.nda
 def _index(name: str, names: tuple[str, ...], kind: str) -> int:
     if name in names:
         return names.index(name)
-    close = difflib.get_close_matches(name, names, n=1)
-    hint = f"; did you mean {close[0]!r}?" if close else ""
+    hint = did_you_mean(name, names, "; ")
     raise ConfigError(f"{kind} {name!r}: not in the character{hint} It has {', '.join(names)}")

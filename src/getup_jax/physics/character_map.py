@@ -15,7 +15,6 @@ Names that are not listed stay. `physics.character` takes the map in place of th
 
 from __future__ import annotations
 
-import difflib
 import importlib.util
 from collections.abc import Mapping
 from pathlib import Path
@@ -24,7 +23,7 @@ from typing import Any
 import mujoco
 
 from getup_jax.config import ConfigError, yaml_text
-from getup_jax.config.check import shown
+from getup_jax.config.check import did_you_mean, shown
 from getup_jax.config.registry import check_name
 from getup_jax.physics.character_additions import ADDITIONS, add_what_lacks
 from getup_jax.physics.reroot import rerooted
@@ -85,8 +84,7 @@ def _rename(spec: mujoco.MjSpec, kind: str, names: Mapping[str, str], where: str
     elements = {x.name: x for x in getattr(spec, _SPEC[kind])}
     for old in names:
         if old not in elements:
-            close = difflib.get_close_matches(old, elements, n=1)
-            hint = f"; did you mean {close[0]!r}?" if close else ""
+            hint = did_you_mean(old, elements, "; ")
             raise ConfigError(f"{where}: {old!r}: not in the file{hint}")
     after = [names.get(name, name) for name in elements if name]
     twice = sorted({name for name in after if after.count(name) > 1})

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Iterable, Sequence
 
 import jax
 import jax.numpy as jnp
 
 from getup_jax.config import CompositeConfig, ConfigError, GroupConfig
+from getup_jax.config.check import did_you_mean
 from getup_jax.core import quaternion as rotation
 from getup_jax.physics.character import CharacterSpec
 
@@ -132,8 +132,7 @@ def _expand(names: Iterable[str], character: CharacterSpec, key: str) -> set[int
         elif name in known:
             found.add(known.index(name))
         else:
-            close = difflib.get_close_matches(name, [*known, *PRESETS], n=1)
-            hint = f"; did you mean {close[0]!r}?" if close else ""
+            hint = did_you_mean(name, [*known, *PRESETS], "; ")
             raise ConfigError(
                 f"{key}: {name!r} is no link{hint} Expected a preset ({', '.join(PRESETS)}) or "
                 f"one of {', '.join(known)}"

@@ -24,7 +24,6 @@ body flies freely and nothing touches the floor.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -33,6 +32,7 @@ import numpy as np
 import yaml
 from scipy.spatial.transform import Rotation
 
+from getup_jax.config.check import did_you_mean
 from getup_jax.motion.authoring.contact_ik import CONTACT_NAMES
 from getup_jax.motion.clips import MotionError
 from getup_jax.physics.character import CharacterSpec
@@ -236,6 +236,5 @@ def _check_keys(content: Any, known: tuple[str, ...], place: str) -> None:
 
 def _check_name(name: Any, known: tuple[str, ...], place: str) -> None:
     if name not in known:
-        close = difflib.get_close_matches(str(name), known, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"expected one of {', '.join(known)}"
+        hint = did_you_mean(str(name), known) or f"expected one of {', '.join(known)}"
         raise MotionError(f"{place}: unknown {name!r}; {hint}")
