@@ -126,27 +126,50 @@ def test_a_policy_of_another_body_cannot_enter():
     bench._check_physics("mine", PhysicsConfig(engine="mjx", threads=3))
 
 
-def test_the_command_runs_a_checkpoint_and_writes_it(tmp_path, monkeypatch, capsys):
-    """All through the command, with the tiny task in place of the library's."""
-    folder = save_policy(tmp_path / "tiny", make_task())
+def small_suites(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
+    """The tiny task with two episodes a suite, in place of the library's."""
 
     def build(config, log, prior=None, choose=None):
         return tiny_task(load_character(config.physics), config)
 
     monkeypatch.setattr(getup, "build_task", build)
-    small = {
-        "own": bench.Suite(
-            False, "tiny", Scenario(episodes=2, pushes_ns=(0.0,), early_termination=False, seed=1)
-        )
-    }
+    scenario = Scenario(episodes=2, pushes_ns=(0.0,), early_termination=False, seed=1)
+    small = {name: bench.Suite(False, "tiny", scenario) for name in names}
     monkeypatch.setattr(bench, "suites", lambda quick=False: small)
     monkeypatch.setattr(bench_report, "suites", lambda quick=False: small)
+
+
+def test_the_command_runs_a_checkpoint_and_writes_it(tmp_path, monkeypatch, capsys):
+    """All through the command, with the tiny task in place of the library's."""
+    folder = save_policy(tmp_path / "tiny", make_task())
+    small_suites(monkeypatch, "own")
     assert bench_main([str(folder), "--json", str(tmp_path / "out.json")]) == 0
     found = json.loads((tmp_path / "out.json").read_text())
     assert found["policy"]["name"] == str(folder)
     assert (found["policy"]["steps"], found["policy"]["outside"]) == (300, False)
     assert found["cells"][0]["episodes"] == 2
+    assert found["missing"] == []
     text = capsys.readouterr().out
     assert "2/2 episodes" in text
     assert "HoST" in text
+    assert "not run" not in text
     assert command.bench_command.__doc__
+
+
+def test_what_has_been_run_when_it_is_interrupted_is_kept(tmp_path, monkeypatch, capsys):
+    folder = save_policy(tmp_path / "tiny", make_task())
+    small_suites(monkeypatch, "own", "limp")
+    calls = []
+
+    def interrupted(*args):
+        calls.append(args)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return getup.run(*args)
+
+    monkeypatch.setattr(bench, "run", interrupted)
+    assert bench_main([str(folder), "--json", str(tmp_path / "out.json")]) == 130
+    found = json.loads((tmp_path / "out.json").read_text())
+    assert [cell["starts"] for cell in found["cells"]] == ["own"]
+    assert found["missing"] == ["limp"]
+    assert "not run: limp" in capsys.readouterr().out

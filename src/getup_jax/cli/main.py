@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -140,10 +141,13 @@ def _render_without_display() -> None:
 
 
 def _guard(command: Callable[..., int], argument: object) -> int:
-    """Run a command; an error of ours is one line for the user, any other a traceback."""
+    """Run a command; our errors and Ctrl-C are one line for the user, other errors a traceback."""
     warnings.showwarning = _show_warning
     try:
         return command(argument)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 128 + signal.SIGINT
     except ValueError as error:
         # ConfigError, CheckpointError, MotionError and the like: all written for the user.
         if not type(error).__module__.startswith("getup_jax."):

@@ -101,6 +101,11 @@ class Result:
     cells: list[Cell]
     motion: dict[str, dict[str, float]]  # suite -> how it moves
 
+    @property
+    def missing(self) -> list[str]:
+        """The suites that have not been run."""
+        return [name for name in suites(self.quick) if name not in self.motion]
+
     def total(self, **same: Any) -> Cell:
         """All cells in which these fields (suite, ground, push_ns) are so, as one."""
         found = [x for x in self.cells if all(getattr(x, k) == v for k, v in same.items())]
@@ -154,8 +159,11 @@ def config_of(config: Config, irregular: bool) -> Config:
     )
 
 
-def run_bench(entry: Entry, quick: bool, engine: str | None, display: Display) -> Result:
-    """All suites, one after the other; `display` counts their episodes."""
+def run_bench(entry: Entry, quick: bool, engine: str | None, display: Display) -> Iterator[Result]:
+    """All suites, one after the other: what it has come to after each of them.
+
+    `display` counts their episodes.
+    """
     wanted, cells, motion = suites(quick), [], {}
     rate, before = Rate(display, sum(x.episodes for x in wanted.values())), 0
     for name, suite in wanted.items():
@@ -171,7 +179,7 @@ def run_bench(entry: Entry, quick: bool, engine: str | None, display: Display) -
         cells += list(cells_of(name, episodes, scenario))
         motion[name] = _motion(episodes)
         before += suite.episodes
-    return Result(entry.name, _facts(entry), quick, cells, motion)
+        yield Result(entry.name, _facts(entry), quick, list(cells), dict(motion))
 
 
 def cells_of(suite: str, episodes: Episodes, scenario: Scenario) -> Iterator[Cell]:

@@ -28,6 +28,8 @@ def table(result: Result) -> str:
     view.add_row("all", "", "", *_figures(result.total()))
     out = io.StringIO()
     Console(file=out, width=120).print(view)
+    if result.missing:
+        out.write(f"not run: {', '.join(result.missing)}\n")
     return out.getvalue()
 
 
@@ -45,6 +47,7 @@ def to_json(result: Result) -> dict[str, Any]:
     return {
         "benchmark": {"version": VERSION, "quick": result.quick, "getup_jax": __version__},
         "policy": {"name": result.name, **result.facts},
+        "missing": result.missing,
         "all": _success(result.total()),
         "cells": [
             {
