@@ -174,10 +174,11 @@ def reach(peers: dict[str, Peer], share: float, limit_s: float) -> None:
                 continue
             success = peer.iterations[-1]["success"]
             done = success is not None and success >= share
+            so_far = "no episode yet" if success is None else f"success {success:.0%}"
+            word = "reached it" if done else "gives up" if peer.seconds > limit_s else "goes on"
+            print(f"{name}: {so_far} after {peer.seconds:.0f} s, {word}", flush=True)
             if done or peer.seconds > limit_s:
                 del waiting[name]
-                word = "reached" if done else "gave up"
-                print(f"{name}: {word} after {peer.seconds:.0f} s", flush=True)
 
 
 def report(args: argparse.Namespace, peers: dict[str, Peer]) -> dict[str, Any]:
