@@ -54,7 +54,10 @@ def test_who_reaches_the_share_stops_and_who_is_late_gives_up(capsys):
         )
     peers.reach(found, 0.9, limit_s=60.0)
     assert [len(x.iterations) for x in found.values()] == [2, 3]
-    assert "fast: reached after 50 s" in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert "fast: success 95% after 50 s, reached it" in text
+    assert "slow: no episode yet after 30 s, goes on" in text
+    assert "slow: success 10% after 70 s, gives up" in text
     rows = peers.report(args("--success", "0.9"), found)["peers"]
     assert (rows["fast"]["reached"], rows["slow"]["reached"]) == (True, False)
     assert (rows["fast"]["seconds"], rows["fast"]["samples"]) == (50.0, 20)
