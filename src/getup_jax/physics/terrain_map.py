@@ -57,6 +57,12 @@ class TerrainMap:
         """The same ground as the task sees it, in NumPy."""
         return HeightField.of(self.heights, self.origin, self.step)
 
+    def cell(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Row and column [...] of the cells below places xy [..., 2] (m), or the nearest ones."""
+        cell = np.floor((np.asarray(xy) - self.origin) / self.step).astype(int)
+        column, row = np.moveaxis(np.clip(cell, 0, len(self.heights) - 2), -1, 0)
+        return row, column
+
     def region(self, xy: np.ndarray) -> np.ndarray:
         """Index into REGIONS of places xy [..., 2] (m); -1 outside all of them."""
         cell = np.floor(np.asarray(xy) / self.region_size).astype(int) + 1
@@ -69,9 +75,7 @@ class TerrainMap:
         On a ground of one's own: whether the ground around them is one even slope.
         """
         if self.even is not None:
-            cell = np.floor((np.asarray(xy) - self.origin) / self.step).astype(int)
-            column, row = np.moveaxis(np.clip(cell, 0, len(self.even) - 1), -1, 0)
-            return self.even[row, column] & (self.region(xy) > 0)
+            return self.even[self.cell(xy)] & (self.region(xy) > 0)
         y = np.asarray(xy)[..., 1] % self.region_size
         return (self.region(xy) > 0) & (y < self.region_size / 2)
 
@@ -113,8 +117,7 @@ def own_ground(config: TerrainConfig) -> TerrainMap:
     xy = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
     region, inside = ground.region(xy), np.abs(xy % size - size / 2)
     margin = np.where(region == 0, _SPAWN_MARGIN_M, _RAMP_M + _SPAWN_MARGIN_M)
-    cell = np.floor((xy - ground.origin) / step).astype(int)
-    fair = (inside.max(axis=1) <= size / 2 - margin) & ~steep[cell[:, 1], cell[:, 0]]
+    fair = (inside.max(axis=1) <= size / 2 - margin) & ~steep[ground.cell(xy)]
     for index, name in enumerate(REGIONS):
         if not fair[region == index].any():
             raise ConfigError(
