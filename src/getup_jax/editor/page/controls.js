@@ -143,19 +143,22 @@ export class Controls {
     const { start } = this.elements, { scene, store } = this, { curve } = store.now;
     const named = (/** @type {string} */ name) => {
       const gap = startGap(store.now, edits.firstOf(scene, name));
-      return option(name, name === curve.start && !curve.pose ? name : gap > scene.match_deg ? `${name} – ${gap.toFixed(0)}° off` : name);
+      return [name, name === curve.start && !curve.pose ? name : gap > scene.match_deg ? `${name} – ${gap.toFixed(0)}° off` : name];
     };
     const groups = LIES.map((lies) => {
       const names = scene.starts.filter((/** @type {any} */ s) => s.lies === lies).map((/** @type {any} */ s) => s.name);
       const all = scene.mirrored === null ? names : names.flatMap((/** @type {string} */ n) => [n, scene.mirrored + n]);
-      return group(lies, all.map(named));
-    }).filter((g) => g.children.length);
-    const known = groups.some((g) => [...g.children].some((o) => /** @type {HTMLOptionElement} */ (o).value === curve.start));
-    const own = known && !curve.pose ? [] : [option(curve.start, `${curve.start} (${curve.pose ? "its own pose" : "unknown here"})`, true)];
-    const text = JSON.stringify([groups.map((g) => g.textContent), own.map((o) => o.textContent)]);
-    if (text !== this.startsShown) start.replaceChildren(...groups, ...own);
+      return { lies, options: all.map(named) };
+    }).filter(({ options }) => options.length);
+    const known = groups.some(({ options }) => options.some((/** @type {string[]} */ [name]) => name === curve.start));
+    const own = known && !curve.pose ? null : `${curve.start} (${curve.pose ? "its own pose" : "unknown here"})`;
+    const text = JSON.stringify([groups, own]);
+    if (text !== this.startsShown) {
+      const lists = groups.map(({ lies, options }) => group(lies, options.map((/** @type {string[]} */ [name, words]) => option(name, words))));
+      start.replaceChildren(...lists, ...(own === null ? [] : [option(curve.start, own, true)]));
+    }
     this.startsShown = text;
-    if (own.length) start.selectedIndex = start.options.length - 1;
-    else start.value = curve.start;
+    if (own !== null) start.selectedIndex = start.options.length - 1;
+    else if (start.value !== curve.start) start.value = curve.start;
   }
 }

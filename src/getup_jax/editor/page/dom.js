@@ -21,6 +21,9 @@ export function option(value, text, disabled = false) { return el("option", { va
 /** @param {string} label @param {HTMLElement[]} options */
 export function group(label, options) { return el("optgroup", { label }, ...options); }
 
+/** Writes words where they differ: the browser lays out anew whatever is written. @param {HTMLElement} element @param {string} words */
+export function write(element, words) { if (element.textContent !== words) element.textContent = words; }
+
 /** Whether a key that is pressed there belongs to what is typed. @param {EventTarget | null} target */
 export function types(target) {
   const { tagName, type } = /** @type {any} */ (target) ?? {};

@@ -1,6 +1,8 @@
 // How long an edit takes until it is on the screen: from the end of the gesture, by the time stamp of
 // its event, to the moment at which the browser and its renderer have drawn the frames.
 
+const SOON_MS = 300; // after the end of a gesture, its first frames are about to come
+
 export class Latency {
   /** @param {(first: number, whole: number | null) => void} report milliseconds; whole is null until the whole motion is drawn */
   constructor(report) {
@@ -24,6 +26,11 @@ export class Latency {
   }
 
   get waits() { return this.due.size > 0; }
+
+  // The first frames of an edit are about to come, or are being drawn.
+  get expects() {
+    return this.request !== null && this.first === null && !this.waits && performance.now() - this.request.released < SOON_MS;
+  }
 
   // Curves and picture are given to the browser and its renderer: they are on the screen after the
   // next animation frame and once the renderer, which works beside the page, is done.

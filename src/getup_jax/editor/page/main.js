@@ -6,7 +6,7 @@ import { Autosave } from "./autosave.js";
 import { reached } from "./contacts.js";
 import { duration } from "./content.js";
 import { Controls } from "./controls.js";
-import { $ } from "./dom.js";
+import { $, write } from "./dom.js";
 import { Exports } from "./export.js";
 import { Files } from "./files.js";
 import { Graph } from "./graph.js";
@@ -31,7 +31,9 @@ import { choose } from "./edits.js";
 
 const store = new Store(), storage = new Storage(), autosave = new Autosave(storage, store, say);
 const link = new Link(), results = new Results(link, store), sources = new Sources(link, store);
-const due = { curves: false, strip: false }; // to be drawn again
+const due = { curves: false, frames: false, strip: false }; // to be drawn again; frames: soon, since more of them come
+const PACE_MS = 100; // between two drawings of the curves while their motion comes in
+let drawn = 0; // when the curves were
 /** @type {any} */
 let scene = null;
 
@@ -115,7 +117,7 @@ results.addEventListener("asked", (/** @type {any} */ { detail: { request } }) =
   player.restart();
 });
 results.addEventListener("frames", (/** @type {any} */ { detail: { result, first } }) => {
-  due.curves = true;
+  due[first ? "curves" : "frames"] = true;
   if (result.slot !== store.active || !first) return;
   showReport();
   stage.face(result);
@@ -158,7 +160,7 @@ function show() {
   tabs.draw();
   tools.show();
   stage.arrange();
-  $("project").textContent = store.project?.name ?? "Project";
+  write($("project"), store.project?.name ?? "Project");
   $("apart-label").hidden = store.variants.length < 2;
   showReport();
 }
@@ -210,12 +212,22 @@ function firstVisit() {
 
 function showFrame() {
   if (!scene || !store.project) return;
-  if (due.curves) graph.draw();
-  else if (player.moved) graph.drawTime();
-  due.curves = false;
-  const pictured = stage.draw(latency.waits);
+  drawCurves();
+  // a picture that is begun now would be in the way of the one that a person waits for
+  const pictured = !latency.expects && stage.draw(latency.waits);
   if (latency.waits && pictured) latency.drawn(stage.fence);
   if (due.strip && stage.drawStrip()) due.strip = false;
+}
+
+function drawCurves() {
+  const now = performance.now();
+  if (!due.curves && !(due.frames && now > drawn + PACE_MS)) {
+    if (player.moved) graph.drawTime();
+    return;
+  }
+  graph.draw();
+  due.curves = due.frames = false;
+  drawn = now;
 }
 
 /** @param {string} text */

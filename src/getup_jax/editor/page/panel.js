@@ -1,13 +1,14 @@
 // One curve: its keys and lines, what the body does, ghosts, the guide, and where physics cannot follow.
 
 import { duration, keysIn, misfit } from "./content.js";
+import { el } from "./dom.js";
 import { KINDS } from "./features.js";
 import { BOTTOM, LEFT, RIGHT, timeLabel, timeTicks, TOP } from "./graph_scale.js";
 import { Gestures } from "./gestures.js";
 import { drawn, SAMPLES } from "./keys.js";
 import { errorParts, recordingLine } from "./panel_motion.js";
 import { sample } from "./spline.js";
-import { make, set, text } from "./svg.js";
+import { fill, make, polyline, set, text } from "./svg.js";
 
 /** @import { Feature } from "./types.js" */
 
@@ -28,9 +29,9 @@ export class Panel {
     this.lines = make("g");
     this.dots = make("g");
     this.over = make("g");
-    this.now = make("line", { class: "now" });
-    this.svg.append(this.back, this.lines, this.now, this.over, this.dots);
-    this.box.append(this.svg);
+    this.now = el("div", { class: "now" }); // no part of the drawing, since it moves in every frame
+    this.svg.append(this.back, this.lines, this.over, this.dots);
+    this.box.append(this.svg, this.now);
     root.append(this.box);
     /** @type {SVGElement[]} */
     this.points = [];
@@ -52,7 +53,7 @@ export class Panel {
     }
     if (!width) return;
     this.drawBack();
-    this.lines.replaceChildren(...this.drawBand(), ...this.drawLines());
+    fill(this.lines, [...this.bandParts(), ...this.lineParts()]);
     this.drawPoints();
     this.drawTime();
   }
@@ -96,19 +97,20 @@ export class Panel {
     return [title, text(this.width - RIGHT, 15, legend, { "text-anchor": "end" })];
   }
 
-  drawBand() {
+  bandParts() {
     const band = this.graph.model.band();
     if (!band) return [];
     const { scale } = this, seconds = duration(this.graph.store.now), last = band.mean.length - 1;
     const line = (/** @type {number} */ sign) => band.mean.map((/** @type {number[]} */ row, /** @type {number} */ i) => (
       `${scale.x((i / last) * seconds)},${scale.y(row[this.index] + sign * band.deviation[i][this.index])}`));
     return [
-      make("polygon", { class: "band", points: [...line(1), ...line(-1).reverse()].join(" ") }),
-      make("polyline", { class: "mean", points: line(0).join(" ") }),
+      { name: "polygon", attributes: { class: "band", points: [...line(1), ...line(-1).reverse()].join(" ") } },
+      polyline("mean", line(0)),
     ];
   }
 
-  drawLines() {
+  /** @returns {import("./svg.js").Part[]} */
+  lineParts() {
     const { graph, scale } = this, { store, model } = graph, { results } = model, parts = [];
     for (const { slot } of store.variants) {
       if (slot !== store.active) parts.push(...this.achieved(results.shown.get(slot)?.motion, `ghost of${slot}`, `ghost of${slot}`));
@@ -116,10 +118,10 @@ export class Panel {
     const recording = model.recording();
     if (recording) parts.push(recordingLine(recording, this.index, scale, duration(store.now)));
     const keys = this.keys, curve = drawn(keys), seconds = duration(store.now);
-    const line = curve.map((value, i) => `${scale.x((i / (SAMPLES - 1)) * seconds)},${scale.y(value)}`);
+    const line = curve.map((value, i) => `${scale.x((i / (SAMPLES - 1)) * seconds).toFixed(1)},${scale.y(value).toFixed(2)}`);
     const motion = results.active?.motion;
     if (motion) parts.push(...errorParts(motion, this.index, this.feature, { scale, height: this.height, dt: model.controlDt }, curve, seconds));
-    parts.push(make("polyline", { class: "target", points: [...line, `${scale.x(model.span())},${scale.y(curve[SAMPLES - 1])}`].join(" ") }));
+    parts.push(polyline("target", [...line, `${scale.x(model.span())},${scale.y(curve[SAMPLES - 1])}`]));
     if (misfit(store.now, this.feature) > MISFIT[this.feature]) parts.push(this.fitted(seconds));
     return [...parts, ...this.achieved(motion, "achieved", "achieved after")];
   }
@@ -127,11 +129,8 @@ export class Panel {
   /** What the policy sees, where nine control points cannot follow what was drawn. @param {number} seconds */
   fitted(seconds) {
     const { scale } = this, seen = sample(this.graph.store.now.curve[this.feature]);
-    const line = make("polyline", { class: "fitted", points: seen.map((v, i) => `${scale.x((i / (SAMPLES - 1)) * seconds)},${scale.y(v)}`).join(" ") });
-    const title = make("title");
-    title.textContent = "The policy sees nine control points: this is the nearest that they come to your curve.";
-    line.append(title);
-    return line;
+    const line = seen.map((v, i) => `${scale.x((i / (SAMPLES - 1)) * seconds)},${scale.y(v)}`);
+    return polyline("fitted", line, "The policy sees nine control points: this is the nearest that they come to your curve.");
   }
 
   /** @param {import("./motion.js").Motion | null | undefined} motion @param {string} name @param {string} after */
@@ -141,11 +140,11 @@ export class Panel {
     const line = (/** @type {number} */ from, /** @type {number} */ to) => {
       const points = [];
       for (let i = from; i < to; i++) points.push(`${scale.x((i + 1) * dt).toFixed(1)},${scale.y(values[i]).toFixed(1)}`);
-      return points.join(" ");
+      return points;
     };
     const end = Math.min(motion.ended, motion.count);
-    const parts = [make("polyline", { class: name, points: line(0, end) })];
-    if (end < motion.count) parts.push(make("polyline", { class: after, points: line(Math.max(end - 1, 0), motion.count) }));
+    const parts = [polyline(name, line(0, end))];
+    if (end < motion.count) parts.push(polyline(after, line(Math.max(end - 1, 0), motion.count)));
     return parts;
   }
 
@@ -170,6 +169,7 @@ export class Panel {
   drawTime() {
     if (!this.width) return;
     const { scale } = this, x = scale.x(Math.min(this.graph.model.time(), this.graph.model.span()));
-    set(this.now, { x1: x, x2: x, y1: TOP, y2: this.height - BOTTOM, visibility: x < LEFT - 1 || x > this.width - RIGHT + 1 ? "hidden" : "visible" });
+    this.now.style.transform = `translateX(${x.toFixed(1)}px)`;
+    this.now.hidden = x < LEFT - 1 || x > this.width - RIGHT + 1;
   }
 }

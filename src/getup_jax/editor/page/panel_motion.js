@@ -2,7 +2,7 @@
 
 import { BOTTOM } from "./graph_scale.js";
 import { SAMPLES } from "./keys.js";
-import { make } from "./svg.js";
+import { polyline } from "./svg.js";
 
 /** @import { Feature, Recording } from "./types.js" */
 /** @import { Scale } from "./graph_scale.js" */
@@ -16,7 +16,7 @@ export function recordingLine(recording, index, scale, seconds) {
   for (let i = 0; i < total; i++) {
     points.push(`${scale.x((i / Math.max(total - 1, 1)) * seconds).toFixed(1)},${scale.y(frames[i * width + links * 7 + index]).toFixed(1)}`);
   }
-  return make("polyline", { class: "recorded", points: points.join(" ") });
+  return polyline("recorded", points);
 }
 
 /** The error of every frame that has come. @param {import("./motion.js").Motion} motion @param {number} index @param {number[]} curve 129 values @param {number} seconds @param {number} dt */
@@ -56,10 +56,7 @@ export function errorParts(motion, index, feature, { scale, height, dt }, curve,
   const marks = lostRuns(found, most).map(([first, last]) => {
     const points = [];
     for (let i = first; i <= last; i++) points.push(`${scale.x((i + 1) * dt).toFixed(1)},${scale.y(at(i)).toFixed(1)}`);
-    const line = make("polyline", { class: "lost", points: points.join(" ") }), title = make("title");
-    title.textContent = "The body does not follow the curve here.";
-    line.append(title);
-    return line;
+    return polyline("lost", points, "The body does not follow the curve here.");
   });
-  return [make("polygon", { class: "error", points: hill.join(" ") }), ...marks];
+  return [{ name: "polygon", attributes: { class: "error", points: hill.join(" ") } }, ...marks];
 }

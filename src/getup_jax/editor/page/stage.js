@@ -2,7 +2,7 @@
 
 import { contacts } from "./contacts.js";
 import { duration } from "./content.js";
-import { $, option } from "./dom.js";
+import { $, option, write } from "./dom.js";
 import { turn } from "./contacts.js";
 import { poseAt } from "./motion_recording.js";
 import { Strip } from "./strip.js";
@@ -111,7 +111,7 @@ export class Stage {
     if (key === this.touching) return;
     this.touching = key;
     const found = motion ? contacts(this.scene, motion.pose(frame(motion)), motion.ground) : [];
-    $("contacts").textContent = found.length ? `On the ground: ${found.join(", ")}` : "";
+    write($("contacts"), found.length ? `On the ground: ${found.join(", ")}` : "");
   }
 
   /** Whether the strip is up to date, or being drawn. */

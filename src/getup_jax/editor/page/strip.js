@@ -48,7 +48,7 @@ export class Strip {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (!motion?.count || !width) return;
     const work = ++this.work;
-    let pose = 0, last = performance.now();
+    let pose = 0, last = performance.now(), shown = last;
     const step = () => {
       if (work !== this.work) return;
       // a view that always draws must not keep the strip from its turn
@@ -58,7 +58,10 @@ export class Strip {
         if (pose === 0) this.begin(width, height);
         this.add(motion, azimuth, pose++);
         this.fence.set();
-        this.fence.then(() => { if (work === this.work) this.show(); }); // as they come
+        if (performance.now() - shown > PATIENCE_MS) { // as they come, where that takes long
+          shown = performance.now();
+          this.fence.then(() => { if (work === this.work) this.show(); });
+        }
       }
       if (pose < POSES) whenIdle(step, { timeout: PATIENCE_MS });
       else this.fence.then(() => { if (work === this.work) this.finish(); });
@@ -108,5 +111,8 @@ export class Strip {
     this.canvas.classList.remove("stale");
   }
 
-  finish() { this.canvas.dataset.drawn = String(this.work); }
+  finish() {
+    this.show();
+    this.canvas.dataset.drawn = String(this.work);
+  }
 }

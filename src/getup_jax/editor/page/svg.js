@@ -1,5 +1,7 @@
 // SVG elements.
 
+/** @typedef {{ name: string, attributes: Record<string, string | number>, title?: string }} Part an element that is to be there; title: words that a mouse finds */
+
 const NS = "http://www.w3.org/2000/svg";
 
 export function make(name, attributes = {}) {
@@ -8,12 +10,44 @@ export function make(name, attributes = {}) {
   return element;
 }
 
+// What stays as it is, is not written: the browser would lay the whole drawing out anew.
 export function set(element, attributes) {
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  for (const [key, value] of Object.entries(attributes)) {
+    const text = String(value);
+    if (element.getAttribute(key) !== text) element.setAttribute(key, text);
+  }
+}
+
+/** Makes an element's children like some others that are only described; those of the same kind are kept. @param {Element} root @param {Part[]} parts */
+export function fill(root, parts) {
+  parts.forEach(({ name, attributes, title }, i) => {
+    let element = root.children[i];
+    if (element?.localName !== name) {
+      const made = make(name);
+      if (element) element.replaceWith(made);
+      else root.append(made);
+      element = made;
+    }
+    set(element, attributes);
+    if (element.textContent === (title ?? "")) return;
+    element.replaceChildren(...(title ? [titled(title)] : []));
+  });
+  while (root.children.length > parts.length) root.lastElementChild?.remove();
+}
+
+function titled(words) {
+  const title = make("title");
+  title.textContent = words;
+  return title;
 }
 
 export function text(x, y, content, attributes = {}) {
   const element = make("text", { x, y, ...attributes });
   element.textContent = content;
   return element;
+}
+
+/** @param {string} kind its class @param {string[]} points @param {string} [title] @returns {Part} */
+export function polyline(kind, points, title) {
+  return { name: "polyline", attributes: { class: kind, points: points.join(" ") }, title };
 }

@@ -2,13 +2,14 @@
 // that is wished there.
 
 import { duration, keysIn } from "./content.js";
-import { $, el, group, option } from "./dom.js";
+import { $, el, group, option, write } from "./dom.js";
 import * as edits from "./edits.js";
 import { clamp, KINDS } from "./features.js";
 import { say } from "./notice.js";
 import { POSES } from "./poses.js";
 import * as selection from "./selection.js";
 import { FEATURES } from "./spline.js";
+import { set } from "./svg.js";
 
 /** @import { Feature, Kind } from "./types.js" */
 
@@ -165,11 +166,11 @@ export class Tools {
     const time = one(({ time: t }) => (graph.frames ? Math.round((t * seconds) / graph.model.controlDt) : Number((t * seconds).toFixed(3))));
     this.put("key-time", time, keys.length);
     this.put("key-value", one((key) => Number(key.value.toFixed(3))), keys.length);
-    $("time-unit").textContent = graph.frames ? "frame" : "s";
-    $("value-unit").textContent = unit;
-    const kind = one((key) => key.kind);
-    for (const [passing] of PASSING) $(`pass-${passing}`).setAttribute("aria-pressed", String(kind === passing));
-    $("key-value").step = keys.length && keys.every((k) => k.feature !== "height") ? KINDS.side_angle.step : KINDS.height.step;
+    write($("time-unit"), graph.frames ? "frame" : "s");
+    write($("value-unit"), unit);
+    const kind = one((key) => key.kind), angles = keys.length && keys.every((k) => k.feature !== "height");
+    for (const [passing] of PASSING) set($(`pass-${passing}`), { "aria-pressed": kind === passing });
+    set($("key-value"), { step: angles ? KINDS.side_angle.step : KINDS.height.step });
   }
 
   /** @param {string} id @param {number | string} value @param {number} count */
