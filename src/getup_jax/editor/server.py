@@ -15,17 +15,20 @@ import json
 import signal
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
 from getup_jax.editor import messages
+from getup_jax.editor.compiled import keep_compiled
 from getup_jax.editor.outbox import Outbox
 from getup_jax.editor.scene import describe
 from getup_jax.editor.session import Session, error_message
 from getup_jax.editor.simulate import Simulator
 from getup_jax.editor.site import Site
+from getup_jax.editor.starts import reference_curve
 from getup_jax.editor.work import Work
 from getup_jax.runtime import checkpoint
 from getup_jax.runtime.checkpoint import LoadedPolicy
@@ -42,6 +45,7 @@ class EditorError(ValueError):
 
 def edit_command(args: argparse.Namespace) -> int:
     """The command line of `getup-edit`; returns the exit code."""
+    keep_compiled()
     loaded = checkpoint.load_policy(args.ckpt)
     _check_task(loaded)
 
@@ -69,9 +73,12 @@ def build_session(
 ) -> tuple[Session, dict[str, Any]]:
     """The session of a policy, compiled, and what pages must know of it."""
     simulator = Simulator.build(loaded, log)
-    scene = describe(simulator, loaded)
     log("compiling the episode ...")
-    simulator.finish(messages.parse(scene["curves"][0], "curve"))
+    first = reference_curve(simulator.task.getups[0])
+    with ThreadPoolExecutor(max_workers=1) as thread:
+        compiled = thread.submit(next, simulator.run(first))  # its first frames need all programs
+        scene = describe(simulator, loaded)
+        compiled.result()
     return Session(simulator), scene
 
 

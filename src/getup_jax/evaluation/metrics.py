@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from getup_jax.envs.getup.episode import LYING
 from getup_jax.evaluation.ground_kinds import Places, kinds
@@ -130,7 +130,7 @@ def wilson(successes: float, trials: int, confidence: float = 0.95) -> tuple[flo
     """Wilson score interval of a share; (nan, nan) without trials."""
     if trials == 0:
         return math.nan, math.nan
-    z = float(norm.ppf(0.5 + confidence / 2))
+    z = float(ndtri(0.5 + confidence / 2))
     share = successes / trials
     centre = (share + z**2 / (2 * trials)) / (1 + z**2 / trials)
     spread = share * (1 - share) / trials + z**2 / (4 * trials**2)
