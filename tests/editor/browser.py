@@ -181,12 +181,24 @@ def picture(page: Any, selector: str) -> np.ndarray:
     return imread(io.BytesIO(page.locator(selector).screenshot()))[..., :3]
 
 
+_SPIN = """import time
+wall, cpu = time.perf_counter(), time.process_time()
+while time.process_time() - cpu < {seconds}:
+    pass
+print((time.perf_counter() - wall) / (time.process_time() - cpu))
+"""
+
+
 def slowdown(seconds: float = 0.3) -> float:
-    """How many times longer work takes here now than on a core of its own."""
-    wall, cpu = time.perf_counter(), time.process_time()
-    while time.process_time() - cpu < seconds:
-        pass
-    return (time.perf_counter() - wall) / (time.process_time() - cpu)
+    """How many times longer work takes here now than on a core of its own.
+
+    Measured in a session of its own, as the browser is: Linux shares time among sessions.
+    """
+    command = [sys.executable, "-c", _SPIN.format(seconds=seconds)]
+    said = subprocess.run(
+        command, stdout=subprocess.PIPE, text=True, check=True, start_new_session=True
+    )
+    return float(said.stdout)
 
 
 def cpu_seconds() -> float:
