@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import socket as sockets
 
 import pytest
 from edit_running import TOKEN, Quick, get, running
 
-from getup_jax.editor.site import host_name
+from getup_jax.editor.site import PAGE, Site, host_name
 
 HERE = "127.0.0.1:8421"
 NAMES = {
@@ -98,6 +99,30 @@ def test_a_request_has_one_host(site, hosts):
 )
 def test_any_request_target_gets_an_answer(site, target, code):
     assert status(site, target, HERE) == code
+
+
+def test_the_page_asks_at_once_for_all_of_its_files_and_a_browser_may_keep_them(site):
+    _, page, headers = get(site, "/")
+    assert headers["Cache-Control"] == "no-store"
+    named = set(re.findall(r'(?:href|src)="([^"]+)"', page.decode()))
+    folders = {name.split("/")[0] for name in named}
+    assert len(folders) == 1
+    modules = {path.relative_to(PAGE).as_posix() for path in PAGE.rglob("*.js")}
+    assert {name.partition("/")[2] for name in named} >= modules | {"style.css", "graph.css"}
+    for name in named:
+        code, content, headers = get(site, f"/{name}")
+        assert (code, headers["Cache-Control"]) == (200, "max-age=31536000, immutable")
+        assert content == (PAGE / name.partition("/")[2]).read_bytes()
+
+
+def test_other_content_is_in_another_folder(monkeypatch, tmp_path):
+    (tmp_path / "index.html").write_text('<head><link href="a.js"></head>')
+    found = []
+    for text in ("1", "1", "2"):
+        (tmp_path / "a.js").write_text(text)
+        monkeypatch.setattr("getup_jax.editor.site.PAGE", tmp_path)
+        found.append(Site.of(None).version)
+    assert found[0] == found[1] != found[2]
 
 
 @pytest.mark.parametrize("query", ["", "token", "token=", "token=%ff", "token=%ED%A0%80"])

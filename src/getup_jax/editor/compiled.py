@@ -1,4 +1,4 @@
-"""What was compiled is kept on the disk, so that the next start of the editor need not do it again."""
+"""What was compiled is kept on the disk: the next start of the editor need not do it again."""
 
 from __future__ import annotations
 

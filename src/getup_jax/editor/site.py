@@ -1,11 +1,17 @@
-"""The page's files and who may ask for them: a fixed table of names, and checks of the sender."""
+"""The page's files and who may ask for them: a fixed table of names, and checks of the sender.
+
+The page names its files by a folder that is called after what is in them: a browser keeps them for
+as long as it likes, and asks for other ones when they change.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import hmac
 import re
 import urllib.parse
+from collections.abc import Collection
 from http import HTTPStatus
 from pathlib import Path
 
@@ -25,6 +31,7 @@ _TYPES = {
 # A name or an IPv4 address, or an IPv6 address in brackets; then perhaps a port. Nothing else: what
 # a lenient reader would take for the name may be what stands before an @.
 _HOST = re.compile(r"(?:([A-Za-z0-9_.-]{1,255})|\[([0-9A-Fa-f:.]{2,45})\])(?::[0-9]{1,5})?")
+_NEVER, _FOREVER = "no-store", "max-age=31536000, immutable"  # whether a browser keeps it
 _TEXT = "text/plain; charset=utf-8"
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -38,6 +45,7 @@ class Site:
 
     files: dict[str, tuple[bytes, str]]  # path of the address -> content and type
     token: str | None  # what the page's address and its socket must say; None: nothing
+    version: str = ""  # folder of those that never change
 
     @classmethod
     def of(cls, token: str | None) -> Site:
@@ -45,10 +53,15 @@ class Site:
         files = {}
         for path in sorted(PAGE.rglob("*")):
             if path.suffix in _TYPES:
-                name = f"/{path.relative_to(PAGE).as_posix()}"
+                name = path.relative_to(PAGE).as_posix()
                 files[name] = (path.read_bytes(), _TYPES[path.suffix])
-        files["/"] = files.pop("/index.html")
-        return cls(files, token)
+        version = hashlib.sha256(b"".join(content for content, _ in files.values())).hexdigest()[
+            :16
+        ]
+        page, kind = files.pop("index.html")
+        table = {f"/{name}": file for name, file in files.items()}
+        kept = {f"/{version}/{name}": file for name, file in files.items()}
+        return cls({**table, **kept, "/": (_versioned(page, version, files), kind)}, token, version)
 
     def answer(self, request: Request) -> Response | None:
         """The file or the refusal; None lets a WebSocket in."""
@@ -63,7 +76,8 @@ class Site:
         found = self.files.get(path)
         if found is None:
             return _response(HTTPStatus.NOT_FOUND, b"not found\n", _TEXT)
-        return _response(HTTPStatus.OK, *found)
+        stays = bool(self.version) and path.startswith(f"/{self.version}/")
+        return _response(HTTPStatus.OK, *found, _FOREVER if stays else _NEVER)
 
     def _refusal(self, headers: Headers, path: str, query: str) -> str | None:
         """Why a request is not answered."""
@@ -88,12 +102,25 @@ def host_name(host: str) -> str | None:
     return None if match is None else (match[1] or match[2]).lower()
 
 
-def _response(status: HTTPStatus, body: bytes, kind: str) -> Response:
+def _versioned(page: bytes, version: str, files: Collection[str]) -> bytes:
+    """The page with its files in their folder, and its modules asked for all at once."""
+
+    def moved(match: re.Match[str]) -> str:
+        attribute, name = match.groups()
+        return f'{attribute}="{version}/{name}"' if name in files else match[0]
+
+    text = re.sub(r'(href|src)="([^"]+)"', moved, page.decode())
+    modules = sorted(name for name in files if name.endswith(".js"))
+    links = "".join(f'  <link rel="modulepreload" href="{version}/{name}">\n' for name in modules)
+    return text.replace("</head>", f"{links}</head>").encode()
+
+
+def _response(status: HTTPStatus, body: bytes, kind: str, cache: str = _NEVER) -> Response:
     headers = Headers(
         {
             "Content-Type": kind,
             "Content-Length": str(len(body)),
-            "Cache-Control": "no-store",
+            "Cache-Control": cache,
             "Content-Security-Policy": _POLICY,
             "X-Content-Type-Options": "nosniff",
             "Referrer-Policy": "no-referrer",

@@ -99,12 +99,16 @@ async function ready(description) {
   veil("");
   const last = store.project ?? (await opened);
   scene = description;
-  if (!stage.begin(scene)) veil("This browser has no WebGL: curves, scores and exports work, the 3-D view does not.");
+  stage.know(scene);
   controls.fill(scene);
   tools.fillPoses(scene);
   results.begin(scene);
   if (store.project) return store.tell("show");
   autosave.open(last ?? project(scene.curves[0], "My get-up"), !last);
+  // the curves first: the server works while the view is made
+  requestAnimationFrame(() => setTimeout(() => {
+    if (!stage.begin()) veil("This browser has no WebGL: curves, scores and exports work, the 3-D view does not.");
+  }));
   if (!storage.lasting) say("This browser keeps nothing: export the project before you close the page.", true);
 }
 

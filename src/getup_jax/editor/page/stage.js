@@ -30,14 +30,19 @@ export class Stage {
     $("standard").replaceChildren(option("", "View…"), ...Object.entries(STANDARD).map(([value, text]) => option(value, text)));
   }
 
-  /** False where the browser has no WebGL. @param {any} scene */
-  begin(scene) {
+  /** @param {any} scene */
+  know(scene) {
     this.scene = scene;
     this.sources.library = new Set(scene.starts.map((/** @type {any} */ s) => s.name));
-    try {
-      this.view ??= new View($("view"), scene);
-      this.strip ??= new Strip($("strip"), scene, this.view.software);
-    } catch { return false; }
+  }
+
+  /** Makes the view; false where the browser has no WebGL. */
+  begin() {
+    if (this.view) return true;
+    try { this.view = new View($("view"), this.scene); } catch { return false; }
+    this.settings();
+    const { active } = this.results;
+    if (active) this.face(active);
     return true;
   }
 
@@ -116,11 +121,12 @@ export class Stage {
 
   /** Whether the strip is up to date, or being drawn. */
   drawStrip() {
-    const { strip, view, results } = this, result = results.active;
-    if (!strip || !view) return true;
-    if (result?.error) strip.clear();
+    const { view, results } = this, result = results.active;
+    if (!view) return false;
+    if (result?.error) this.strip?.clear();
     if (!result?.verdict || !result.motion) return Boolean(result?.error);
-    strip.draw(result.motion, view.orbit.azimuth, () => !view.fence.waiting);
+    this.strip ??= new Strip($("strip"), this.scene, view.software);
+    this.strip.draw(result.motion, view.orbit.azimuth, () => !view.fence.waiting);
     return true;
   }
 
