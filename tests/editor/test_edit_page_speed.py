@@ -30,7 +30,7 @@ FIRST_MS = 150.0  # from the release of a point to the first new frame, on a cor
 PAGE_MS = 75.0  # the page's and the browser's share of it, likewise
 WHOLE_MS = 600.0  # until all of it is there
 FOUR_MS = 1000.0  # the same with three ghosts
-LOAD_MS = 1000.0  # from the call of the page to its curves
+LOAD_MS = 1000.0  # from the call of the page to its curves and the body on the screen
 READY_S = 10.0  # from the start of a server that has run before to its first answer
 MEMORY_MIB = 1024.0
 BUSY = 2.0  # times as long as on a core of its own: too busy to judge times
@@ -86,9 +86,12 @@ def test_a_page_is_there_within_a_second(page_server):
     with opened(page_server[0]) as page:
         for _ in range(EDITS // 3):
             page.reload()
-            page.wait_for_selector("[data-point]")
-            took.append(page.evaluate("performance.now()"))
-            page.wait_for_selector("body[data-shown]")
+            page.wait_for_function(
+                "() => performance.getEntriesByName('getup: page drawn').length > 0"
+            )
+            took.append(
+                page.evaluate("performance.getEntriesByName('getup: page drawn')[0].startTime")
+            )
     print(f"page: median {median(took):.0f}, {min(took):.0f} to {max(took):.0f} ms")
     assert median(took) < LOAD_MS * _quiet(took)
 

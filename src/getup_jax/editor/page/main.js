@@ -34,6 +34,7 @@ const link = new Link(), results = new Results(link, store), sources = new Sourc
 const due = { curves: false, frames: false, strip: false }; // to be drawn again; frames: soon, since more of them come
 const PACE_MS = 100; // between two drawings of the curves while their motion comes in
 let drawn = 0; // when the curves were
+let there = false; // curves and body have been drawn once
 /** @type {any} */
 let scene = null;
 
@@ -220,6 +221,10 @@ function showFrame() {
   // a picture that is begun now would be in the way of the one that a person waits for
   const pictured = !latency.expects && stage.draw(latency.waits);
   if (latency.waits && pictured) latency.drawn(stage.fence);
+  if (!there && pictured && stage.view && results.active?.motion) {
+    there = true;
+    stage.whenFree(() => performance.mark("getup: page drawn"));
+  }
   if (due.strip && stage.drawStrip()) due.strip = false;
 }
 
