@@ -25,6 +25,7 @@ TIMES = """() => {
   const times = (name) => performance.getEntriesByName(name).map((e) => e.startTime + e.duration);
   return [times("getup: first came").at(-1), times("getup: first drawn").at(-1)];
 }"""
+DRAWN = "performance.getEntriesByName('getup: page drawn')"
 EDITS = 15
 FIRST_MS = 150.0  # from the release of a point to the first new frame, on a core of its own
 PAGE_MS = 75.0  # the page's and the browser's share of it, likewise
@@ -86,12 +87,8 @@ def test_a_page_is_there_within_a_second(page_server):
     with opened(page_server[0]) as page:
         for _ in range(EDITS // 3):
             page.reload()
-            page.wait_for_function(
-                "() => performance.getEntriesByName('getup: page drawn').length > 0"
-            )
-            took.append(
-                page.evaluate("performance.getEntriesByName('getup: page drawn')[0].startTime")
-            )
+            page.wait_for_function(f"() => {DRAWN}.length > 0")
+            took.append(page.evaluate(f"{DRAWN}[0].startTime"))
     print(f"page: median {median(took):.0f}, {min(took):.0f} to {max(took):.0f} ms")
     assert median(took) < LOAD_MS * _quiet(took)
 
