@@ -7,7 +7,7 @@ import json
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from browser import BROWSER, HEIGHT, drag, edited, opened, saved, shot, value
+from browser import BROWSER, HEIGHT, drag, edited, opened, saved, says, shot, value
 
 from getup_jax.cli import main
 from getup_jax.motion.getup import curves
@@ -15,6 +15,8 @@ from getup_jax.motion.io.bvh import read_bvh
 from getup_jax.motion.io.curve_file import read_curve_file
 from getup_jax.motion.io.recording import forward, scaled
 
+JUDGED = """count => [...document.querySelectorAll('#curve optgroup[label=imported] option')]
+  .filter((option) => /[✓✗]/.test(option.textContent)).length === count"""
 MILLIMETRE = 0.001
 
 pytestmark = BROWSER
@@ -90,6 +92,50 @@ def test_a_motion_file_gives_its_curve_and_start_pose(page_server, tmp_path):
         page.wait_for_timeout(2000)
         shot(page, "imported")
         assert read_curve_file(saved(page, "#save", tmp_path)).pose is not None
+
+
+def test_what_was_imported_is_judged_one_by_one(page_server, tmp_path):
+    with opened(page_server[0], accept_downloads=True) as page:
+        stands = saved(page, "npz", tmp_path)
+        page.set_input_files("#file-motion", str(stands))
+        imported = page.locator("#curve optgroup[label=imported] option")
+        page.wait_for_function(JUDGED, arg=1)
+        assert f"{stands.name}, " in imported.first.inner_text()
+        assert "✓ stands after" in imported.first.inner_text()
+        kept = page.locator("body[data-saved]")
+        kept.wait_for()
+        page.reload()
+        page.wait_for_selector("body[data-shown]")
+        page.wait_for_function(JUDGED, arg=1)  # a project's, when it is opened
+
+
+def test_a_film_is_large_says_how_far_it_is_and_can_be_cancelled(page_server, tmp_path):
+    imageio = pytest.importorskip("imageio.v2", reason="needs pip install 'getup-jax[video]'")
+    with opened(page_server[0], accept_downloads=True) as page:
+        page.click("#export")
+        page.select_option("#format", "mp4")
+        page.click("#export-go")
+        page.wait_for_function(
+            "() => document.getElementById('export-progress').value > 0.02", timeout=60_000
+        )
+        shot(page, "film")
+        page.click("#export-cancel")
+        says(page, "toast", "cancelled")
+        assert not page.locator("#dialog").evaluate("dialog => dialog.open")
+        page.locator("#scrub").fill("0.04")
+        page.click("#out")
+        page.click("#export")
+        page.select_option("#format", "mp4")
+        page.select_option("#part", "range")
+        with page.expect_download(timeout=60_000) as download:
+            page.click("#export-go")
+        file = tmp_path / "film.mp4"
+        download.value.save_as(file)
+    with imageio.get_reader(file) as film:
+        frames = list(film)
+        assert film.get_meta_data()["fps"] == 30
+    assert frames[0].shape == (1080, 1920, 3)
+    assert 5 <= len(frames) <= 10  # a twenty-fifth of 6.4 s at 30 frames/s
 
 
 def test_a_file_that_is_no_curve_file_is_refused_with_a_reason(page_server, tmp_path):

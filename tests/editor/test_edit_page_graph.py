@@ -75,6 +75,38 @@ def test_time_and_value_are_typed_and_read(page_server):
         assert page.input_value("#key-time") == "54"
 
 
+def test_two_fingers_zoom_the_curves_and_not_the_page(page_server):
+    viewport = {"width": 390, "height": 844}
+    with opened(page_server[0], viewport=viewport, has_touch=True, is_mobile=True) as page:
+        page.click("#hint-close")
+        page.locator(f'[aria-label="{HEIGHT}"]').scroll_into_view_if_needed()
+        frame, ticks = box(page), shown_ticks(page)
+        before = page.evaluate("[visualViewport.scale, scrollY]")
+        touch = page.context.new_cdp_session(page)
+        middle, level = frame["x"] + 0.4 * frame["width"], frame["y"] + 0.5 * frame["height"]
+
+        def fingers(kind: str, *places: float) -> None:
+            points = [{"x": x, "y": level, "id": i} for i, x in enumerate(places)]
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        fingers("touchStart", middle - 20)
+        fingers("touchStart", middle - 20, middle + 20)
+        for step in range(1, 8):
+            fingers("touchMove", middle - 20 - 8 * step, middle + 20 + 8 * step)
+        fingers("touchEnd")
+        drawn(page)
+        zoomed = shown_ticks(page)
+        assert zoomed[-1] - zoomed[0] < 0.6 * (ticks[-1] - ticks[0])
+        assert page.evaluate("[visualViewport.scale, scrollY]") == before
+        assert page.is_disabled("#undo"), "the fingers edited something"
+
+
+def shown_ticks(page) -> list[float]:
+    """Times along the axis of the first panel."""
+    texts = page.locator(f'[aria-label="{HEIGHT}"] text[text-anchor="middle"]').all_inner_texts()
+    return [float(text) for text in texts]
+
+
 def test_slower_by_mouse_alone(page_server, tmp_path):
     with opened(page_server[0], accept_downloads=True) as page:
         before = float(re.search(r"[\d.]+", page.inner_text("#verdict"))[0])

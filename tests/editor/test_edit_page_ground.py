@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from browser import BROWSER, achieved, edited, opened, picture, served, shot
+from browser import BROWSER, achieved, edited, opened, picture, saved, served, shot
 from edit_samples import save_ground_policy
 from ground_samples import TERRAIN
 
+from getup_jax.motion.io.curve_file import read_curve_file
 from getup_jax.physics.terrain_map import REGIONS
 
 pytestmark = BROWSER
@@ -49,6 +50,24 @@ def test_a_region_and_a_place_in_it_can_be_chosen(ground_server):
         assert (page.input_value("#place"), page.input_value("#start")) == ("2", start)
         fill(page, "99")
         assert page.input_value("#place") == page.get_attribute("#place", "max")
+
+
+def test_region_and_place_are_kept_in_the_file_and_in_the_project(ground_server, tmp_path):
+    with opened(ground_server[0], accept_downloads=True) as page:
+        edited(page, lambda: page.select_option("#curve", label="supine_quadruped_right"))
+        edited(page, lambda: page.select_option("#region", label="hard"))
+        edited(page, lambda: fill(page, "3"))
+        file, line = saved(page, "#save", tmp_path), achieved(page)
+        assert read_curve_file(file).ground == ("hard", 3)
+        page.wait_for_timeout(300)
+        page.wait_for_selector("body[data-saved]")
+        page.reload()
+        page.wait_for_selector("body[data-shown]")
+        assert (page.input_value("#region"), page.input_value("#place")) == ("3", "3")
+        edited(page, lambda: page.select_option("#region", label="flat"))
+        edited(page, lambda: page.set_input_files("#file-curve", str(file)))
+        assert (page.input_value("#region"), page.input_value("#place")) == ("3", "3")
+        assert achieved(page) == line
 
 
 def fill(page, place: str) -> None:

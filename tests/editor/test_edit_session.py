@@ -130,3 +130,43 @@ def test_a_verdict_says_how_the_episode_ended(motion):
     assert messages.verdict(low).startswith("too far from the curves at 0.4 s (")
     head = dataclasses.replace(low, task_reward=np.full(len(running), 0.5))
     assert messages.verdict(head) == "fails at 0.4 s: head on the floor"
+
+
+def test_what_nobody_watches_is_simulated_between_edits_and_is_the_same(session, simulator):
+    wanted = simulator.finish(make_curve(1.1))
+    slow, box, found = session.simulator, Box(), []
+    other = threading.Thread(
+        target=lambda: found.append(session.motion(Request("judge", 1, 0, make_curve(1.1))))
+    )
+    other.start()
+    slow.gate.set()
+    session.submit(0, ask(2), box)
+    assert box.done.wait(60)
+    other.join(60)
+    np.testing.assert_array_equal(found[0].frames.qpos, wanted.frames.qpos)
+    assert box.got[-1]["type"] == "result"
+
+
+def test_chunks_of_two_motions_may_take_turns(simulator):
+    curves = make_curve(1.1), make_curve(1.4)
+    wanted = [simulator.finish(curve).frames.qpos for curve in curves]
+    runs = [simulator.run(curve) for curve in curves]
+    found = [[], []]
+    for parts in zip(*runs, strict=True):
+        for i, part in enumerate(parts):
+            if not hasattr(part, "scores"):
+                found[i].append(part.qpos)
+    for qpos, alone in zip(found, wanted, strict=True):
+        np.testing.assert_array_equal(np.concatenate(qpos), alone)
+
+
+def test_an_abandoned_motion_ends_between_two_chunks(session):
+    session.simulator.gate.set()
+
+    def check():
+        if session.simulator.chunks:
+            raise TimeoutError
+
+    with pytest.raises(TimeoutError):
+        session.motion(Request("judge", 1, 0, make_curve(1.1)), check)
+    assert session.simulator.chunks == 1

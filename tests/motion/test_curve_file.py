@@ -49,6 +49,13 @@ def test_what_is_written_reads_back_to_the_last_bit(tmp_path):
     assert again.values.tobytes() == curve.values.tobytes()
 
 
+def test_a_file_may_say_where_on_irregular_ground_it_was_drawn():
+    curve = parse_text(changed(region="hard", place=3), "file")
+    assert curve.ground == ("hard", 3)
+    assert parse_text(dump(curve), "file").ground == ("hard", 3)
+    assert parse_text(TEXT, "file").ground is None
+
+
 def test_starts_are_motions_their_mirror_images_or_a_pose_of_the_file(character):
     pose = character.neutral_qpos.copy()
     pose[7 + character.joint("thigh_l_flex")] = 0.5
@@ -110,6 +117,11 @@ NINE = [0.5] * 9
         (changed(durations=[]), "durations: expected 1 to 16 numbers"),
         (changed(pose=[0.0] * 56), "pose: expected a root position, a unit quaternion"),
         (changed(pose=[1.0]), "pose: expected a root position"),
+        (changed(region="moon", place=1), "region: expected one of flat, easy, medium, hard, got"),
+        (changed(region=["hard"], place=1), "region: expected one of"),
+        (changed(region="hard"), "place: expected a whole number from 1 to 10000, got None"),
+        (changed(region="hard", place=0), "place: expected a whole number"),
+        (changed(place=2), "region: expected one of flat"),
     ],
 )
 def test_what_is_no_curve_file_is_refused_with_a_reason(text, message):

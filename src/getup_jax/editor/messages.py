@@ -32,7 +32,7 @@ _FILE_NAME = re.compile(r"[\w ().+-]{1,100}")
 _LENGTH = struct.Struct("<I")
 
 
-_TYPES = ("simulate", "save", "load", "export", "import", "recording", "cancel")
+_TYPES = ("simulate", "judge", "save", "load", "export", "import", "recording", "cancel")
 _NAMELESS = {"name": "curve", "strategy": "other"}  # where nothing is made that has a name
 
 
@@ -47,7 +47,7 @@ class Request:
     type: str  # one of _TYPES
     number: int  # the page's own, comes back with the answer
     slot: int = 0  # variant
-    curve: CurveFile | None = None  # simulate, save, export
+    curve: CurveFile | None = None  # simulate, judge, save, export
     place: Place = ANYWHERE
     format: str = ""  # export
     cut: Cut = WHOLE  # export

@@ -8,7 +8,7 @@ import json
 import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from getup_jax.editor import messages
@@ -33,7 +33,8 @@ class Session:
     """One thread that simulates; pages submit and may leave at any time.
 
     A job replaces the one of the same page and variant, also one that is being simulated: that
-    stops after the chunk at hand. Others wait in the order in which they came.
+    stops after the chunk at hand. Others wait in the order in which they came. Motions that are
+    wanted for something else are simulated in between, a chunk at a time.
     """
 
     def __init__(self, simulator: Simulator) -> None:
@@ -54,7 +55,7 @@ class Session:
             self._waiting[key] = Job(key, request, send)
             if self._current is not None and self._current.key == key:
                 self._current = None
-            self._wake.notify()
+            self._wake.notify_all()
 
     def forget(self, page: int) -> None:
         """The page is gone."""
@@ -63,24 +64,41 @@ class Session:
                 del self._waiting[key]
             if self._current is not None and self._current.key[0] == page:
                 self._current = None
+            self._wake.notify_all()
 
-    def motion(self, request: Request) -> Motion:
-        """The motion of a request: the one that was shown last for it, or simulated now."""
+    def motion(self, request: Request, check: Callable[[], None] = lambda: None) -> Motion:
+        """The motion of a request: the one that was shown last for it, or simulated now.
+
+        check: called between two chunks; what it raises ends the simulation.
+        """
         key = _key(request)
         with self._wake:
             if key in self._motions:
                 return self._motions[key]
         assert request.curve is not None
-        with self._compute:
-            motion = self.simulator.finish(request.curve, request.place)
-        self._keep(key, motion)
-        return motion
+        for part in self._between(self.simulator.run(request.curve, request.place)):
+            check()
+            if isinstance(part, Motion):
+                self._keep(key, part)
+                return part
+        raise AssertionError("a run ends with its motion")
+
+    def _between(self, parts: Iterator[Frames | Motion]) -> Iterator[Frames | Motion]:
+        """The parts, each made when no page waits for frames."""
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._stopped or not (self._waiting or self._current))
+            with self._compute:
+                part = next(parts, None)
+            if part is None:
+                return
+            yield part
 
     def stop(self) -> None:
         """End the thread after the chunk at hand."""
         with self._wake:
             self._stopped, self._current = True, None
-            self._wake.notify()
+            self._wake.notify_all()
         self._thread.join(timeout=10)
 
     def _work(self) -> None:
@@ -96,6 +114,10 @@ class Session:
                     self._simulate(job)
             except Exception as error:  # a job that fails stops no other
                 job.send(error_message(job.request, error))
+            with self._wake:
+                if self._current is job:
+                    self._current = None
+                self._wake.notify_all()
 
     def _simulate(self, job: Job) -> None:
         begin, curve = time.perf_counter(), job.request.curve
@@ -145,5 +167,5 @@ def error_message(request: Request | None, error: Exception) -> str:
 def _key(request: Request) -> str:
     """What a motion depends on; names change none."""
     assert request.curve is not None
-    named = dataclasses.replace(request.curve, name="", strategy="")
+    named = dataclasses.replace(request.curve, name="", strategy="", ground=None)
     return json.dumps([named.plain(), dataclasses.astuple(request.place)])

@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { close } from "./samples.js";
 import { cameraAt } from "../../../src/getup_jax/editor/page/camera.js";
 import { contacts, reached } from "../../../src/getup_jax/editor/page/contacts.js";
-import { Scale, snapped, timeTicks, within, zoomed } from "../../../src/getup_jax/editor/page/graph_scale.js";
+import { pinched, Scale, snapped, timeTicks, within, zoomed } from "../../../src/getup_jax/editor/page/graph_scale.js";
 import { lostRuns } from "../../../src/getup_jax/editor/page/panel_motion.js";
 
 test("a scale turns places into times and values, and back", () => {
@@ -20,6 +20,17 @@ test("zooming keeps what is under the pointer and stays inside the motion", () =
   assert.deepEqual(within([0, 99], 6), [0, 6]);
   const [a, b] = within([1, 1.001], 6);
   assert.ok(b - a > 0.19);
+});
+
+test("what lies between two fingers stays there, however they move", () => {
+  const scale = new Scale(500, 200, [1, 4], [0, 1]);
+  for (const [other, before, now] of [[[100, 50], [300, 60], [400, 60]], [[300, 50], [100, 50], [160, 90]], [[200, 50], [200, 90], [200, 150]]]) {
+    const middle = scale.time((other[0] + before[0]) / 2);
+    const after = new Scale(500, 200, pinched(scale, other, before, now), [0, 1]);
+    assert.ok(Math.abs(after.time((other[0] + now[0]) / 2) - middle) < 1e-9);
+  }
+  const [low, high] = pinched(scale, [100, 50], [200, 50], [300, 50]);
+  assert.ok(Math.abs(high - low - 1.5) < 1e-9, "twice as far apart shows half of the time");
 });
 
 test("ticks are few and at round times", () => {

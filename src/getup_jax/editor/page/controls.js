@@ -18,6 +18,7 @@ export class Controls {
     /** @type {any} */
     this.scene = null;
     this.listed = "";
+    this.judged = (/** @type {Curve} */ _) => ""; // what the policy makes of a curve
     const { curve, band, start, region, place, duration: slider, seconds, shift } = elements;
     curve.addEventListener("change", () => this.choose(curve.value));
     band.addEventListener("change", onGuide);
@@ -77,12 +78,16 @@ export class Controls {
   /** Curves to begin with: the library's by how they lie, the drawn ones, the imported ones. */
   fillCurves() {
     const imported = this.store.project?.imported ?? [], { starts, curves } = this.scene;
-    const listed = `${this.store.project?.id} ${imported.length}`;
+    const words = imported.map(({ curve }) => this.judged(curve));
+    const listed = [this.store.project?.id, imported.length, ...words].join();
     if (listed === this.listed) return;
     this.listed = listed;
     const references = new Map(starts.map((/** @type {any} */ s) => [s.name, s.lies]));
     const of = (/** @type {string | undefined} */ lies) => curves.flatMap((/** @type {Curve} */ c, /** @type {number} */ i) => (references.get(c.name) === lies ? [option(`c${i}`, c.name)] : []));
-    const own = imported.map(({ curve, file }, i) => option(`i${i}`, `${curve.name} (${file}, ${curve.durations[0].toFixed(1)} s, ${alike(curve, curves)})`));
+    const own = imported.map(({ curve, file }, i) => {
+      const parts = [file, `${curve.durations[0].toFixed(1)} s`, alike(curve, curves), words[i]].filter(Boolean);
+      return option(`i${i}`, `${curve.name} (${parts.join(", ")})`);
+    });
     const groups = [...LIES.map((lies) => group(lies, of(lies))), group("drawn", of(undefined)), group("imported", own)];
     this.elements.curve.replaceChildren(option("", "choose …"), ...groups.filter((g) => g.children.length));
   }

@@ -30,7 +30,8 @@ export class Files {
 
   async save() {
     try {
-      const file = await this.link.ask({ type: "save", curve: this.store.now.curve });
+      const { curve, region, place } = this.store.now;
+      const file = await this.link.ask({ type: "save", curve, region, place });
       download(file.name, file.payload);
       say(`${file.name} saved`);
     } catch (error) { say(/** @type {Error} */ (error).message, true); }

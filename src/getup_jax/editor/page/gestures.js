@@ -2,6 +2,7 @@
 
 import { duration } from "./content.js";
 import * as edits from "./edits.js";
+import { Fingers } from "./fingers.js";
 import { BOTTOM, LEFT, RIGHT, snapped, zoomed } from "./graph_scale.js";
 import { valueAt } from "./keys.js";
 import * as selection from "./selection.js";
@@ -27,6 +28,9 @@ export class Gestures {
       handle.addEventListener("pointerdown", (event) => this.scale(event, side));
       return handle;
     });
+    /** @type {((e: PointerEvent | null) => void) | null} */
+    this.stop = null; // ends the gesture at hand
+    new Fingers(panel, () => this.stop?.(null));
     panel.over.append(this.box, this.frame, ...this.handles);
   }
 
@@ -58,8 +62,10 @@ export class Gestures {
     svg.setPointerCapture(event.pointerId);
     const stop = (/** @type {PointerEvent | null} */ e) => {
       own.abort();
+      this.stop = null;
       end(e);
     };
+    this.stop = stop;
     svg.addEventListener("pointermove", (e) => { if (e.pointerId === event.pointerId) move(e); }, { signal });
     svg.addEventListener("pointerup", (e) => stop(e), { signal });
     svg.addEventListener("pointercancel", () => stop(null), { signal });
@@ -184,7 +190,7 @@ export class Gestures {
     if (i >= 0) graph.select({ [feature]: [i] });
   }
 
-  /** Time about the pointer; with Shift sideways, with Alt or Ctrl the values. @param {WheelEvent} event */
+  /** Time about the pointer, also for a pinch on a touchpad, which comes as Ctrl; with Shift sideways, with Alt the values. @param {WheelEvent} event */
   wheel(event) {
     event.preventDefault();
     const { graph, panel } = this, { scale, feature } = panel, [x, y] = this.at(event);
@@ -192,7 +198,7 @@ export class Gestures {
     if (event.shiftKey) {
       const by = 0.001 * (event.deltaY || event.deltaX) * (scale.times[1] - scale.times[0]);
       graph.zoom([scale.times[0] + by, scale.times[1] + by]);
-    } else if (event.altKey || event.ctrlKey) {
+    } else if (event.altKey) {
       graph.values[feature] = zoomed(scale.values, scale.value(y), factor);
       graph.draw();
     } else graph.zoom(zoomed(scale.times, scale.time(x), factor));

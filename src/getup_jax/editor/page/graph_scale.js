@@ -32,6 +32,14 @@ export class Scale {
 /** A range that is `factor` times as long, with `about` in its place. @param {Range} range @param {number} about @param {number} factor @returns {Range} */
 export function zoomed([low, high], about, factor) { return [about + (low - about) * factor, about + (high - about) * factor]; }
 
+/** The times that are shown once one of two fingers has moved: what lay between them stays there. @param {Scale} scale @param {number[]} other px @param {number[]} before px @param {number[]} now px @returns {Range} */
+export function pinched(scale, other, before, now) {
+  const apart = (/** @type {number[]} */ p) => Math.max(Math.hypot(p[0] - other[0], p[1] - other[1]), 1);
+  const factor = apart(before) / apart(now), moved = (now[0] - before[0]) / 2;
+  const [low, high] = zoomed(scale.times, scale.time((before[0] + other[0]) / 2), factor), by = (moved / scale.across) * (high - low);
+  return [low - by, high - by];
+}
+
 /** A range of times inside of the whole motion. @param {Range} range @param {number} span s @returns {Range} */
 export function within([low, high], span) {
   const length = clamp(high - low, Math.min(LEAST_S, span), span), start = clamp(low, 0, span - length);

@@ -10,6 +10,7 @@ import { $, write } from "./dom.js";
 import { Exports } from "./export.js";
 import { Files } from "./files.js";
 import { Graph } from "./graph.js";
+import { Judging } from "./judging.js";
 import { Latency } from "./latency.js";
 import { Link } from "./link.js";
 import { say } from "./notice.js";
@@ -60,6 +61,9 @@ const tools = new Tools($("tools"), graph, player);
 const tabs = new Tabs($("variants"), store);
 const ids = ["curve", "band", "start", "region", "place", "duration", "seconds", "shift", "name", "undo", "redo", "reset", "mirror"];
 const controls = new Controls(Object.fromEntries(ids.map((id) => [id, $(id)])), store, () => { due.curves = true; });
+const judging = new Judging(link, store);
+controls.judged = (curve) => judging.of(curve);
+judging.addEventListener("change", () => controls.show());
 const stage = new Stage(store, results, player, sources);
 const projects = new Projects(storage, store, autosave, () => scene.curves[0]);
 new Exports(link, store, { scene: () => scene, range: () => model.range, still: () => stage.still() });
@@ -145,6 +149,7 @@ store.addEventListener("change", (/** @type {any} */ { detail: { kind, at } }) =
   if (kind === "project") begin();
   results.update(at); // first: the server works while the page draws
   sources.update();
+  judging.update();
   show();
   due.curves = true;
   due.strip ||= kind === "show" || kind === "project"; // of an edit when its motion is there
@@ -182,11 +187,13 @@ function wishes() {
 
 /** @param {import("./types.js").Curve[]} curves @param {string} file */
 function taken(curves, file) {
-  const [curve] = curves;
-  store.commit((now) => choose(now, curve));
+  const [{ region, place, ...curve }] = curves, regions = scene.terrain?.regions ?? [];
+  const ground = regions.includes(region) ? { region: regions.indexOf(region), place: Math.min(place ?? 1, scene.terrain.places) - 1 } : {};
+  store.commit((now) => ({ ...choose(now, curve), ...ground }));
   const more = curves.length > 1 ? `; ${curves.length - 1} more under Curve` : "";
   const lengths = curve.durations.length > 1 ? ` (of its durations ${curve.durations.join(", ")} s the middle one)` : "";
-  say(`${file}: ${curve.name}${lengths}, ${alike(curve, scene.curves)}${more}`);
+  const left = region && !regions.includes(region) ? `; its place on irregular ground is left out, since this policy knows flat ground alone` : "";
+  say(`${file}: ${curve.name}${lengths}, ${alike(curve, scene.curves)}${more}${left}`);
 }
 
 for (const id of ["source", "follow", "apart", "standard"]) $(id).addEventListener("change", () => {

@@ -12,6 +12,7 @@ import { fill, make, polyline, set, text } from "./svg.js";
 
 /** @import { Feature } from "./types.js" */
 
+const LEGEND_PX = 420; // narrower, words would lie on each other
 const MISFIT = { height: 0.015, side_angle: 2, front_angle: 2 }; // shown from here on: m, degrees
 
 export class Panel {
@@ -93,7 +94,7 @@ export class Panel {
     const title = text(LEFT, 15, this.kind.title, { class: "title" }), unit = make("tspan", { class: "unit" });
     unit.textContent = ` ${this.kind.unit} · ${this.kind.hint}`;
     title.append(unit);
-    const legend = this.index ? "" : "blue asked for · orange done";
+    const legend = this.index || this.width < LEGEND_PX ? "" : "blue asked for · orange done";
     return [title, text(this.width - RIGHT, 15, legend, { "text-anchor": "end" })];
   }
 

@@ -36,7 +36,7 @@ export function listen(shortcuts) {
 
 const MOUSE = [
   ["drag a point", "time and value; it snaps to frames and round values, Ctrl for the other way"], ["double click", "a new point"], ["drag over nothing", "select with a box; Shift adds"],
-  ["the frame of several points", "drag a side to scale time or value"], ["click, or drag the axis below", "go to a time"], ["wheel", "zoom time; Shift: move; Alt: zoom values"],
+  ["the frame of several points", "drag a side to scale time or value"], ["click, or drag the axis below", "go to a time"], ["wheel, two fingers", "zoom time; Shift: move; Alt: zoom values"],
   ["Alt and drag", "move along the time"], ["arrows on a point", "up and down: value (Shift: five times); left and right: next point; Alt: a frame"], ["in the view", "drag to orbit, wheel or two fingers to zoom"],
 ];
 

@@ -15,6 +15,8 @@
  * @property {number[]} side_angle
  * @property {number[]} front_angle
  * @property {number[]} [pose]
+ * @property {string} [region] of irregular ground, in files alone
+ * @property {number} [place] there, from 1
  */
 
 /**

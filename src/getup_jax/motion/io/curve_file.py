@@ -8,6 +8,8 @@
     side_angle: [90, ...]                   # degrees, the right side to up
     front_angle: [179, ...]                 # degrees, the front to up
     pose: [0, 0, 0.1, 1, 0, 0, 0, ...]      # only where `start` is no reference motion: qpos
+    region: hard                            # only where it was drawn on irregular ground: where
+    place: 3
 
 Configs (`motion.source`), `getup-eval --curves` and the curve editor take the same files.
 """
@@ -29,10 +31,12 @@ from getup_jax.config.yaml_text import YamlError
 from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.getup.curves import NAMES, NUM_POINTS
 from getup_jax.physics.character import CharacterSpec
+from getup_jax.physics.terrain_map import REGIONS
 
 SUFFIXES = (".yaml", ".yml")
 MIRRORED = "mirrored "  # before the name of a reference motion: its mirror image
 KEYS = ("name", "strategy", "start", "durations", *NAMES)
+_OPTIONAL = ("pose", "region", "place")
 DURATION_S = (0.5, 20.0)
 # Of height (m), side and front angle (degrees). The curve stays inside the hull of its points, and
 # points past what a body can do bend it towards there.
@@ -40,6 +44,7 @@ LIMITS = ((-0.5, 2.5), (-90.0, 270.0), (-90.0, 270.0))
 _MAX_BYTES = 64_000
 _MOTIONS, _EITHER = (".bvh", ".amc", ".asf", ".npz"), (".json", ".txt")
 _MAX_DURATIONS = 16
+_MOST_PLACES = 10_000
 _NAME = re.compile(r"[\w.@:~ -]{1,80}")
 _SHORT = reprlib.Repr()  # of what came instead
 _SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxstring = 2, 4, 100
@@ -50,6 +55,8 @@ _COMMENTS = {
     "side_angle": "degrees, the right side to up",
     "front_angle": "degrees, the front to up",
     "pose": "root position (m), root quaternion (wxyz), hinges (rad)",
+    "region": "of irregular ground, in the editor alone",
+    "place": "there",
 }
 
 
@@ -63,6 +70,7 @@ class CurveFile:
     durations: tuple[float, ...]  # s
     values: np.ndarray  # [9, 3] control points: m, degrees, degrees
     pose: np.ndarray | None = None  # [7 + J] the start pose itself
+    ground: tuple[str, int] | None = None  # region, and place there from 1, that it was drawn in
 
     def getups(self, clip: Clip | None = None) -> list[GetUp]:
         """One get-up a duration, NAME@T, that starts from the clip's first pose if one is given."""
@@ -95,7 +103,11 @@ class CurveFile:
         content: dict[str, Any] = {"name": self.name, "strategy": self.strategy}
         content |= {"start": self.start, "durations": list(self.durations)}
         content |= {name: self.values[:, i].tolist() for i, name in enumerate(NAMES)}
-        return content if self.pose is None else {**content, "pose": self.pose.tolist()}
+        if self.pose is not None:
+            content["pose"] = self.pose.tolist()
+        if self.ground is not None:
+            content["region"], content["place"] = self.ground
+        return content
 
 
 def read_curve_file(path: str | Path) -> CurveFile:
@@ -132,7 +144,7 @@ def parse_text(text: str | bytes, where: str) -> CurveFile:
 
 def parse(content: Any, where: str) -> CurveFile:
     """The style in the content of a file, however it came; every value is checked."""
-    if not isinstance(content, Mapping) or set(content) - {"pose"} != set(KEYS):
+    if not isinstance(content, Mapping) or set(content) - set(_OPTIONAL) != set(KEYS):
         mapping = isinstance(content, Mapping)
         found = ", ".join(_shown(k).strip("'") for k in content) if mapping else content
         raise MotionError(f"{where}: expected the keys {', '.join(KEYS)}, got {_shown(found)}")
@@ -155,6 +167,7 @@ def parse(content: Any, where: str) -> CurveFile:
         durations=tuple(durations),
         values=values,
         pose=_pose(content["pose"], where) if "pose" in content else None,
+        ground=_ground(content, where) if {"region", "place"} & set(content) else None,
     )
 
 
@@ -179,6 +192,15 @@ def _pose(content: Any, where: str) -> np.ndarray:
     if len(pose) < 8 or not 0.9 < float(np.linalg.norm(pose[3:7])) < 1.1:
         raise _wrong(where, "pose", "a root position, a unit quaternion and hinge angles", content)
     return pose
+
+
+def _ground(content: Mapping, where: str) -> tuple[str, int]:
+    region, place = content.get("region"), content.get("place")
+    if region not in REGIONS:
+        raise _wrong(where, "region", f"one of {', '.join(REGIONS)}", region)
+    if isinstance(place, bool) or not isinstance(place, int) or not 1 <= place <= _MOST_PLACES:
+        raise _wrong(where, "place", f"a whole number from 1 to {_MOST_PLACES}", place)
+    return str(region), place
 
 
 def _numbers(content: Any, where: str, key: str, limits: tuple[float, float]) -> list[float]:

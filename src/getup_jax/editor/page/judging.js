@@ -1,0 +1,45 @@
+// What the policy makes of the imported curves: each is simulated once, after whatever is edited.
+
+/** @import { Curve } from "./types.js" */
+
+export class Judging extends EventTarget {
+  /** @param {import("./link.js").Link} link @param {import("./store.js").Store} store */
+  constructor(link, store) {
+    super();
+    this.link = link;
+    this.store = store;
+    /** @type {Map<string, string>} by the curve */
+    this.words = new Map();
+    this.busy = false;
+  }
+
+  /** What came of a curve, in a few words; none yet: an empty text. @param {Curve} curve */
+  of(curve) { return this.words.get(keyOf(curve)) ?? ""; }
+
+  /** Asks for those that were never judged, one after the other. */
+  async update() {
+    if (this.busy) return;
+    this.busy = true;
+    for (let next = this.next(); next && this.link.open; next = this.next()) {
+      const said = await this.judge(next);
+      if (said === null) break;
+      this.words.set(keyOf(next), said);
+      this.dispatchEvent(new Event("change"));
+    }
+    this.busy = false;
+  }
+
+  /** @returns {Curve | undefined} */
+  next() { return this.store.project?.imported.map((one) => one.curve).find((curve) => !this.words.has(keyOf(curve))); }
+
+  /** Null where the connection was lost. @param {Curve} curve */
+  async judge(curve) {
+    try {
+      const { success, verdict } = await this.link.ask({ type: "judge", curve });
+      return `${success ? "✓" : "✗"} ${verdict}`;
+    } catch (error) { return this.link.open ? `✗ ${/** @type {Error} */ (error).message}` : null; }
+  }
+}
+
+/** Names change nothing. @param {Curve} curve */
+function keyOf({ name, strategy, ...curve }) { return JSON.stringify(curve); }
