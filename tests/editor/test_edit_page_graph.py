@@ -103,7 +103,7 @@ def test_two_fingers_zoom_the_curves_and_not_the_page(page_server):
 
 def shown_ticks(page) -> list[float]:
     """Times along the axis of the first panel."""
-    texts = page.locator(f'[aria-label="{HEIGHT}"] text[text-anchor="middle"]').all_inner_texts()
+    texts = page.locator(f'[aria-label="{HEIGHT}"] text[text-anchor="middle"]').all_text_contents()
     return [float(text) for text in texts]
 
 
