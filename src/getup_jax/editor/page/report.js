@@ -1,5 +1,6 @@
 // The words below the strip: verdict, tracking errors, warnings, and how long the last edit took.
 
+const LONG = 60; // letters of a verdict that needs smaller ones
 const DEGREES = 180 / Math.PI;
 
 /** @import { Result } from "./types.js" */
@@ -52,7 +53,7 @@ export class Report {
     this.shown = shown;
     const { verdict, scores } = this.elements;
     verdict.textContent = words;
-    verdict.className = mood;
+    verdict.className = [mood, words.length > LONG ? "long" : ""].join(" ").trim();
     verdict.title = words;
     scores.replaceChildren(...parts.flatMap((part, i) => [unbroken(i + 1 < parts.length ? `${part} ·` : part), " "]));
   }
