@@ -14,6 +14,7 @@ import itertools
 import json
 import signal
 import sys
+import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -45,6 +46,9 @@ class EditorError(ValueError):
 
 def edit_command(args: argparse.Namespace) -> int:
     """The command line of `getup-edit`; returns the exit code."""
+    # a film's ffmpeg is a fork and an exec in one, which is safe; films in several threads take each
+    # other's filter away, so that this one is for good
+    warnings.filterwarnings("ignore", message="os.fork", category=RuntimeWarning)
     keep_compiled()
     loaded = checkpoint.load_policy(args.ckpt)
     _check_task(loaded)
