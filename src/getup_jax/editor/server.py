@@ -46,8 +46,8 @@ class EditorError(ValueError):
 
 def edit_command(args: argparse.Namespace) -> int:
     """The command line of `getup-edit`; returns the exit code."""
-    # a film's ffmpeg is a fork and an exec in one, which is safe; films in several threads take each
-    # other's filter away, so that this one is for good
+    # a film's ffmpeg is a fork and an exec in one, which is safe; films in several threads take
+    # each other's filter away, so that this one is for good
     warnings.filterwarnings("ignore", message="os.fork", category=RuntimeWarning)
     keep_compiled()
     loaded = checkpoint.load_policy(args.ckpt)

@@ -131,12 +131,13 @@ class Simulator:
         carry = self.start(world, zero, zero, followed, region)
         begin = np.asarray(carry.state.physics.kinematics.qpos[0])
         traces, parts, total = [], [], self.steps(curve)
+        data = mujoco.MjData(self.character.model)
         for first in range(0, total, CHUNK):
             carry, trace = self.advance(world, self.policy, carry)
             keep = min(CHUNK, total - first)
             trace = jax.tree.map(lambda x, keep=keep: np.asarray(x)[:keep], trace)
             traces.append(trace)
-            parts.append(self._frames(first, trace))
+            parts.append(self._frames(first, trace, data))
             yield parts[-1]
         whole: Trace = jax.tree.map(lambda *x: np.concatenate(x), *traces)
         yield Motion(
@@ -158,12 +159,12 @@ class Simulator:
         assert isinstance(motion, Motion)
         return motion
 
-    def _frames(self, first: int, trace: Trace) -> Frames:
+    def _frames(self, first: int, trace: Trace, data: mujoco.MjData) -> Frames:
         qpos = trace.qpos[:, 0]
         return Frames(
             first=first,
             qpos=qpos,
-            links=link_poses(self.character, qpos),
+            links=link_poses(self.character, qpos, data),
             features=trace.features[:, 0],
             running=trace.running[:, 0],
         )
@@ -191,15 +192,20 @@ def _with_clips(getups: tuple[GetUp, ...], _: CharacterSpec) -> tuple[GetUp, ...
     return tuple(getup for getup in getups if getup.clip is not None)
 
 
-def link_poses(character: CharacterSpec, qpos: np.ndarray) -> np.ndarray:
-    """Position (m) and quaternion (wxyz) of every link [F, L, 7] in poses [F, 7 + J]."""
+def link_poses(
+    character: CharacterSpec, qpos: np.ndarray, data: mujoco.MjData | None = None
+) -> np.ndarray:
+    """Position (m) and quaternion (wxyz) of every link [F, L, 7] in poses [F, 7 + J].
+
+    data: the character's, to work in; it takes longer to make one than to pose ten frames.
+    """
     model = character.model
-    data = mujoco.MjData(model)
+    work: Any = mujoco.MjData(model) if data is None else data
     poses = np.empty((len(qpos), model.nbody - 1, 7), np.float32)
     for row, pose in zip(qpos, poses, strict=True):
-        data.qpos[:] = row
-        mujoco.mj_kinematics(model, data)
-        pose[:, :3], pose[:, 3:] = data.xpos[1:], data.xquat[1:]
+        work.qpos[:] = row
+        mujoco.mj_kinematics(model, work)
+        pose[:, :3], pose[:, 3:] = work.xpos[1:], work.xquat[1:]
     return poses
 
 
