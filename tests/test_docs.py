@@ -9,7 +9,7 @@ import make_settings
 import pytest
 
 import getup_jax as gj
-from getup_jax.motion.io.curve_file import KEYS, parse_text
+from getup_jax.motion.io.curve_file import KEYS, OPTIONAL, parse_text
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -70,7 +70,7 @@ def test_the_curve_file_to_copy_is_one():
     example = text.split("An example to copy")[1].split("\n| key |")[0]
     lines = [line[4:] for line in example.splitlines() if line.startswith("    ")]
     curve = parse_text("\n".join(lines), "example")
-    assert re.findall(r"^\| `(\w+)`", text, re.MULTILINE) == [*KEYS, "pose"]
+    assert re.findall(r"^\| `(\w+)`", text, re.MULTILINE) == [*KEYS, *OPTIONAL]
     assert curve.getups()[0].duration == 2.5
 
 

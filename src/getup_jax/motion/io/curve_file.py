@@ -36,7 +36,7 @@ from getup_jax.physics.terrain_map import REGIONS
 SUFFIXES = (".yaml", ".yml")
 MIRRORED = "mirrored "  # before the name of a reference motion: its mirror image
 KEYS = ("name", "strategy", "start", "durations", *NAMES)
-_OPTIONAL = ("pose", "region", "place")
+OPTIONAL = ("pose", "region", "place")
 DURATION_S = (0.5, 20.0)
 # Of height (m), side and front angle (degrees). The curve stays inside the hull of its points, and
 # points past what a body can do bend it towards there.
@@ -144,7 +144,7 @@ def parse_text(text: str | bytes, where: str) -> CurveFile:
 
 def parse(content: Any, where: str) -> CurveFile:
     """The style in the content of a file, however it came; every value is checked."""
-    if not isinstance(content, Mapping) or set(content) - set(_OPTIONAL) != set(KEYS):
+    if not isinstance(content, Mapping) or set(content) - set(OPTIONAL) != set(KEYS):
         mapping = isinstance(content, Mapping)
         found = ", ".join(_shown(k).strip("'") for k in content) if mapping else content
         raise MotionError(f"{where}: expected the keys {', '.join(KEYS)}, got {_shown(found)}")
