@@ -68,7 +68,7 @@ PYTHONS = re.compile(r"Error|Traceback|codec|argument|NoneType|/tmp|/home|\.py\b
 @pytest.fixture(scope="module")
 def session():
     """Enough of a session for what needs no simulation."""
-    starts = types.SimpleNamespace(clips={}, places=0)
+    starts = types.SimpleNamespace(clips={})
     simulator = types.SimpleNamespace(character=load_character(PhysicsConfig()), starts=starts)
     return types.SimpleNamespace(simulator=simulator)
 

@@ -109,6 +109,7 @@ def test_what_was_imported_is_judged_one_by_one(page_server, tmp_path):
         page.wait_for_function(JUDGED, arg=1)  # a project's, when it is opened
 
 
+@pytest.mark.filterwarnings("ignore:os.fork")  # of the reader's own ffmpeg
 def test_a_film_is_large_says_how_far_it_is_and_can_be_cancelled(page_server, tmp_path):
     imageio = pytest.importorskip("imageio.v2", reason="needs pip install 'getup-jax[video]'")
     with opened(page_server[0], accept_downloads=True) as page:

@@ -43,7 +43,7 @@ def pids(tmp_path, monkeypatch):
 
 @pytest.fixture
 def site(pids):
-    simulator = types.SimpleNamespace(character=CHARACTER, starts=types.SimpleNamespace(places=0))
+    simulator = types.SimpleNamespace(character=CHARACTER)
     with running(lambda log: (Quick(simulator), {})) as server:
         yield server.wait(2)
 
@@ -121,7 +121,7 @@ def test_a_page_has_two_imports_at_once(site, pids):
 
 
 def test_a_server_that_ends_leaves_no_worker_behind(pids):
-    simulator = types.SimpleNamespace(character=CHARACTER, starts=types.SimpleNamespace(places=0))
+    simulator = types.SimpleNamespace(character=CHARACTER)
     with contextlib.ExitStack() as stack:
         with running(lambda log: (Quick(simulator), {})) as server:
             importing(opened(stack, server.wait(2)))

@@ -15,9 +15,8 @@ from getup_jax.editor.recordings import packed
 from getup_jax.editor.session import Session
 from getup_jax.editor.simulate import Simulator
 from getup_jax.editor.verdict import verdict
-from getup_jax.motion.io.curve_file import CurveFile, dump, parse_text
+from getup_jax.motion.io.curve_file import dump, parse_text
 from getup_jax.motion.retarget.subprocess_job import Stop
-from getup_jax.physics.terrain_map import REGIONS
 
 
 def answer(
@@ -42,8 +41,8 @@ def answer(
         return _recording(request.name, session.simulator, header)
     assert request.curve is not None
     if request.type == "save":
-        name, curve = f"{request.curve.name}.yaml", _on_its_ground(request, session.simulator)
-        return messages.pack({"type": "file", **header, "name": name}, dump(curve).encode())
+        name = f"{request.curve.name}.yaml"
+        return messages.pack({"type": "file", **header, "name": name}, dump(request.curve).encode())
     motion = session.motion(request, stop.check)
     stop.check()
     if request.type == "judge":
@@ -56,14 +55,6 @@ def answer(
     content = export(motion, character, request.format, request.cut, stop, progress)
     name = f"{request.curve.name}.{request.format}"
     return messages.pack({"type": "file", **header, "name": name}, content)
-
-
-def _on_its_ground(request: Request, simulator: Simulator) -> CurveFile:
-    """The curve with the region and the place that it was drawn in; a plane has none."""
-    assert request.curve is not None
-    place = request.place
-    ground = (REGIONS[place.region], place.number + 1) if simulator.starts.places else None
-    return dataclasses.replace(request.curve, ground=ground)
 
 
 def _imported(request: Request, content: bytes, session: Session, stop: Stop) -> bytes:

@@ -6,7 +6,7 @@ import { say } from "./notice.js";
 /** @import { Curve, Recording } from "./types.js" */
 
 export class Files {
-  /** @param {import("./link.js").Link} link @param {import("./store.js").Store} store @param {{ opened: (curves: Curve[], file: string) => void, imported: (curves: Curve[], recordings: (Recording | null)[], file: string) => void, project: (text: string, file: string) => void }} to */
+  /** @param {import("./link.js").Link} link @param {import("./store.js").Store} store @param {{ opened: (curves: Curve[], file: string) => void, imported: (curves: Curve[], recordings: (Recording | null)[], file: string) => void, project: (text: string, file: string) => void, ground: () => { region?: string, place?: number } }} to ground: the curve's region and place, for its file */
   constructor(link, store, to) {
     this.link = link;
     this.store = store;
@@ -30,8 +30,7 @@ export class Files {
 
   async save() {
     try {
-      const { curve, region, place } = this.store.now;
-      const file = await this.link.ask({ type: "save", curve, region, place });
+      const file = await this.link.ask({ type: "save", curve: { ...this.store.now.curve, ...this.to.ground() } });
       download(file.name, file.payload);
       say(`${file.name} saved`);
     } catch (error) { say(/** @type {Error} */ (error).message, true); }

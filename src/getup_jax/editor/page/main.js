@@ -74,6 +74,7 @@ const files = new Files(link, store, {
     taken(curves, file);
   },
   project: (text, file) => projects.import(text, file),
+  ground: () => (scene.terrain ? { region: scene.terrain.regions[store.now.region], place: store.now.place + 1 } : {}),
 });
 const keys = shortcuts({ store, player, tools, graph, files, stage, help: () => help(keys) });
 listen(keys);
