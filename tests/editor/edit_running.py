@@ -53,6 +53,18 @@ class Running:
             self._loop.run_until_complete(self._task)
         except BaseException as error:
             self.error = error
+        finally:
+            self._end()
+
+    def _end(self):
+        """Nothing of this server is left to the tests after it."""
+        left = asyncio.all_tasks(self._loop)
+        for task in left:
+            task.cancel()
+        if left:
+            self._loop.run_until_complete(asyncio.wait(left))
+        self._loop.run_until_complete(self._loop.shutdown_default_executor())
+        self._loop.close()
 
     def wait(self, lines: int = 2):
         deadline = time.monotonic() + 30
@@ -65,7 +77,8 @@ class Running:
         return int(re.search(r":(\d+)/", self.said[0])[1])
 
     def stop(self):
-        self._loop.call_soon_threadsafe(self._task.cancel)
+        with contextlib.suppress(RuntimeError):  # where it has ended by itself
+            self._loop.call_soon_threadsafe(self._task.cancel)
         self._thread.join(30)
 
 
