@@ -113,6 +113,19 @@ def test_a_fall_ends_every_objective_with_its_reward(built, steps):
     assert (np.asarray(output.final_observation) != np.asarray(output.observation))[fallen].any()
 
 
+def test_an_action_that_is_not_a_number_ends_its_episode(built, steps):
+    step, states, _ = steps
+    action = jnp.zeros((SIZE, 28)).at[1, 4].set(jnp.nan)
+    state, output = step(built.world, states[0], action)
+    expected = np.arange(SIZE) == 1
+    np.testing.assert_array_equal(output.ended["not_finite"], expected)
+    np.testing.assert_array_equal(output.terminated, expected)
+    assert_allclose(output.reward[1], -1.0)
+    assert np.isfinite(output.final_observation).all()
+    _, output = step(built.world, state, jnp.zeros((SIZE, 28)))
+    assert not output.terminated.any()
+
+
 def test_episodes_are_cut_after_their_time(built, steps):
     _, states, _ = steps
     env = dataclasses.replace(

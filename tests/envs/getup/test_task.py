@@ -338,6 +338,21 @@ def test_a_broken_simulation_is_reset_without_reward_and_the_run_goes_on(jitted)
     assert np.isfinite(output.reward).all()
 
 
+@pytest.mark.parametrize("number", [0, LATENT + 3])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_an_action_that_is_not_finite_ends_its_episode_and_no_later_one(jitted, number, value):
+    state = jitted.start(STANDING).replace(key=jax.random.PRNGKey(4))
+    after, output = jitted.step(jitted.world, state, state.action.at[1, number].set(value))
+    np.testing.assert_array_equal(output.ended["not_finite"], [0, 1, 0, 0])
+    np.testing.assert_array_equal(output.terminated, [False, True, False, False])
+    np.testing.assert_array_equal(output.reward[1], 0.0)
+    for _ in range(2):
+        assert all(np.isfinite(x).all() for x in (output.final_observation, after.observation))
+        assert np.isfinite(output.reward).all()
+        after, output = jitted.step(jitted.world, after, after.action)
+    assert not output.ended["not_finite"].any()
+
+
 def test_the_same_key_gives_the_same_run(jitted):
     task, world = jitted.task, jitted.world
 

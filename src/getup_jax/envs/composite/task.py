@@ -151,7 +151,8 @@ class CompositeTask:
         target = jnp.clip(target, world.target_lower, world.target_upper)
         balls = self.goals.command(state.goals, state.physics.kinematics)
         physics = self.engine.step(state.physics, target, balls)
-        finite = physics.kinematics.finite
+        finite = physics.kinematics.finite & jnp.isfinite(target).all(axis=-1)
+        physics = physics.replace(kinematics=physics.kinematics.replace(finite=finite))
         frame = jnp.where(finite[:, None, None], link_state(physics.kinematics), 0.0)
         history = jnp.concatenate([state.history[:, 1:], frame[:, None]], axis=1)
         goals, goal_outputs = self.goals.step(key_goals, state.goals, physics.kinematics)

@@ -197,11 +197,10 @@ class GetUpTask:
         if self.config.rewards:
             own = self._user_terms(state, posture, target)
             terms |= own | {"total": math.prod(own.values(), start=terms["total"])}
-        finite = physics.kinematics.finite
+        finite = physics.kinematics.finite & jnp.isfinite(filtered).all(axis=-1)  # it would stay
         terms = {name: jnp.where(finite, value, 0.0) for name, value in terms.items()}
-        control_dt = self.engine.control_dt
         gap = terminations.head_gap(self.character, world.terrain, physics.kinematics)
-        head = gap < self.config.head_clearance_m
+        head, control_dt = gap < self.config.head_clearance_m, self.engine.control_dt
         grace_s = self.curriculum.config.head_grace_s
         state, causes = terminations.counted(
             self.config, control_dt, state, terms["task"], head, grace_s
