@@ -71,7 +71,7 @@ def test_evaluate_is_what_the_command_says(policy):
 
 
 def test_what_is_not_possible_is_one_line(policy):
-    with pytest.raises(ConfigError, match="num_envs: expected at least 1, got 0"):
+    with pytest.raises(ConfigError, match="num_envs: expected a whole number of at least 1, got 0"):
         gj.make_env(policy, num_envs=0)
     with pytest.raises(ConfigError, match="a scenario or training=True, got both"):
         gj.make_env(policy, scenario=gj.Scenario(), training=True)

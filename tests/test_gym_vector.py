@@ -111,7 +111,11 @@ def test_pictures_of_every_episode(envs):
         ({"config": "quikc"}, "quikc"),
         ({"render_mode": "human"}, "render_mode: expected None or 'rgb_array', got 'human'"),
         ({"training": True, "scenario": gj.Scenario()}, "a scenario or training=True, got both"),
-        ({"num_envs": 0}, "num_envs: expected at least 1, got 0"),
+        ({"num_envs": 0}, "num_envs: expected a whole number of at least 1, got 0"),
+        ({"num_envs": 2.5}, "num_envs: expected a whole number of at least 1, got 2.5"),
+        ({"config": 3}, "config: expected a config, a policy, or a name, got 3"),
+        ({"scenario": 3}, "scenario: expected a getup_jax.Scenario, got 3"),
+        ({"training": "yes"}, "training: expected True or False, got 'yes'"),
     ],
 )
 def test_what_is_not_possible_is_one_line(options, text):
@@ -124,6 +128,12 @@ def test_wrong_calls_are_one_line(envs):
     envs.reset(seed=0)
     with pytest.raises(ConfigError, match=r"actions: expected an array of shape \(6, 65\)"):
         envs.step(np.zeros((6, 3)))
+    with pytest.raises(ConfigError, match="actions: expected an array of numbers of shape"):
+        envs.step("x")
+    actions = np.zeros(envs.action_space.shape)
+    actions[2, 7] = np.nan
+    with pytest.raises(ConfigError, match=r"finite numbers, got nan at \(2, 7\) \(1 of 390\)"):
+        envs.step(actions)
     with pytest.raises(ConfigError, match="seed: expected one number"):
         envs.reset(seed=[1] * SIZE)
     with pytest.raises(ConfigError, match="options: expected none, got reset_mask"):

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import numbers
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -190,8 +191,11 @@ def make_env(
 
     Raises ConfigError for what is not possible.
     """
-    if num_envs < 1:
-        raise ConfigError(f"num_envs: expected at least 1, got {num_envs}")
+    if not isinstance(num_envs, numbers.Integral) or num_envs < 1:
+        raise ConfigError(f"num_envs: expected a whole number of at least 1, got {num_envs!r}")
+    _check_kind("training", training, bool, "True or False")
+    _check_kind("scenario", scenario, Scenario | None, "a getup_jax.Scenario")
+    _check_kind("config", source, Policy | Config | str | Path, "a config, a policy, or a name")
     if training and scenario is not None:
         raise ConfigError("make_env: expected a scenario or training=True, got both")
     prior = None
@@ -209,6 +213,11 @@ def make_env(
     built = build_task(config, log, prior, getup.chosen_styles(config, scenario or Scenario()))
     styles = tuple(style.name for style in built.getups)
     return Env(config, num_envs, built.environment, built.world, styles)
+
+
+def _check_kind(name: str, value: object, kind: Any, expected: str) -> None:
+    if not isinstance(value, kind):
+        raise ConfigError(f"{name}: expected {expected}, got {value!r}")
 
 
 def train(

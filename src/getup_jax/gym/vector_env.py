@@ -158,11 +158,23 @@ def check_reset(seed: Any, options: dict[str, Any] | None) -> None:
 
 
 def check_actions(actions: Any, shape: tuple[int, ...] | None) -> np.ndarray:
-    """The actions as float32; raises ConfigError where they have another shape."""
-    actions = np.asarray(actions, np.float32)
-    if actions.shape != shape:
-        raise ConfigError(f"actions: expected an array of shape {shape}, got {actions.shape}")
-    return actions
+    """The actions as float32; raises ConfigError for another shape, or for what is not finite."""
+    try:
+        values = np.asarray(actions, np.float32)
+    except (TypeError, ValueError) as reason:
+        raise ConfigError(
+            f"actions: expected an array of numbers of shape {shape}: {reason}"
+        ) from None
+    if values.shape != shape:
+        raise ConfigError(f"actions: expected an array of shape {shape}, got {values.shape}")
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        first = tuple(bad[0].tolist())
+        raise ConfigError(
+            f"actions: expected finite numbers, got {values[first]} at {first} "
+            f"({len(bad)} of {values.size}); a learner that gives NaN has diverged"
+        )
+    return values
 
 
 def _infos(output: Any, done: np.ndarray) -> dict[str, Any]:
