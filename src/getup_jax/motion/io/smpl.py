@@ -52,6 +52,8 @@ _ROOTS, _BODIES = ("root_orient", "global_orient"), ("pose_body", "body_pose")
 _RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
 _MEASURED = "joints"
 _LARGEST = 1e4
+# numbers of a frame: the joints that are read, and those of SMPL, SMPL-H and SMPL-X
+_WIDTHS = (66, 72, 156, 165)
 
 
 def is_smpl(path: Path) -> bool:
@@ -127,21 +129,28 @@ class _Arrays:
         """Of JOINTS [F, 22, 4] wxyz in their parents."""
         whole = self.first(_POSES)
         values = self._flat(whole) if whole is not None else self._in_parts()
-        if len(values) < 1 or values.shape[1] < 3 * len(JOINTS):
-            raise MotionError(
-                f"{self.path.name}: {whole or 'poses'}: expected frames of 72, 156 or 165 numbers, "
-                f"rotation vectors of at least {len(JOINTS)} joints, got {values.shape}; rotation "
-                "matrices are converted with scipy's Rotation.from_matrix(m).as_rotvec()"
-            )
+        if len(values) < 1 or values.shape[1] not in _WIDTHS:
+            raise self._no_vectors(whole or "poses", values.shape)
         vectors = values[:, : 3 * len(JOINTS)].reshape(-1, 3)
         turns = Rotation.from_rotvec(vectors).as_quat(scalar_first=True)
         return turns.reshape(len(values), len(JOINTS), 4)
+
+    def _no_vectors(self, name: str, shape: tuple[int, ...]) -> MotionError:
+        widths = ", ".join(map(str, _WIDTHS[:-1]))
+        return MotionError(
+            f"{self.path.name}: {name}: expected frames of {widths} or {_WIDTHS[-1]} numbers, "
+            f"rotation vectors of the joints, got {shape}; cut other hands off: poses[:, "
+            f":{_WIDTHS[0]}]; matrices and quaternions are converted with scipy's "
+            "Rotation.from_matrix(m).as_rotvec() and from_quat"
+        )
 
     def _flat(self, name: str) -> np.ndarray:
         """[F, 3 N], also of [F, N, 3]."""
         values = read_arrays(self.path, (name,))[name]
         if values.ndim == 3 and values.shape[2] == 3:
             return self.checked(name, (-1, -1, 3)).reshape(len(values), -1)
+        if values.ndim != 2:
+            raise self._no_vectors(name, values.shape)
         return self.checked(name, (-1, -1))
 
     def _in_parts(self) -> np.ndarray:
@@ -165,9 +174,10 @@ class _Arrays:
         name = self.first(_RATES)
         value = None if name is None else read_arrays(self.path, (name,))[name]
         if value is None or value.size != 1 or value.dtype.kind not in "iuf":
+            got = "none" if value is None else f"{value.dtype} of shape {value.shape}"
             raise MotionError(
-                f"{self.path.name}: expected a rate as {_RATES[0]}, got "
-                f"{'none' if value is None else value.shape}; give it with --source-fps 30"
+                f"{self.path.name}: expected a rate as {_RATES[0]}, got {got}; give it with "
+                "--source-fps 30"
             )
         fps = float(value.ravel()[0])
         if not 1.0 <= fps <= _LARGEST:
