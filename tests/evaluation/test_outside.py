@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 import types
 
 import jax
@@ -133,7 +134,11 @@ STATE = {"target": np.zeros((2, 3), np.float32)}
         (lambda _: np.zeros((3, 2)), r"expected servo targets of shape \(2, 3\), got \(3, 2\)"),
         (lambda _: np.full((2, 3), np.nan), "expected finite servo targets"),
         (lambda _: "no", "mine: failed: ValueError"),
-        (lambda state: state["qpoz"], "mine: failed: KeyError: 'qpoz'"),
+        (
+            lambda state: state["qpoz"],
+            r"mine: failed: KeyError: 'qpoz' \(test_outside.py, line \d+\)",
+        ),
+        (lambda _: sys.exit(3), "mine: failed: SystemExit: 3"),
     ],
 )
 def test_what_a_policy_gets_wrong_is_one_line(act, message):
@@ -155,6 +160,8 @@ def test_a_function_and_a_class_are_found_by_their_names(tmp_path, monkeypatch):
         load_outside("my_outside_policies:Go")
     with pytest.raises(ConfigError, match="no_such_thing:f: cannot be imported: ModuleNotFound"):
         load_outside("no_such_thing:f")
+    with pytest.raises(ConfigError, match=r"is not a package; leave \.py off$"):
+        load_outside("my_outside_policies.py:stay")
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,8 @@ import dataclasses
 import importlib
 import os
 import sys
+import sysconfig
+import traceback
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -46,9 +48,8 @@ class OutsidePolicy:
     def _guarded(self, call: Callable[[], Any]) -> Any:
         try:
             return call()
-        except Exception as error:
-            text = " ".join(str(error).split())
-            raise ConfigError(f"{self.name}: failed: {type(error).__name__}: {text}") from error
+        except (Exception, SystemExit) as error:
+            raise ConfigError(f"{self.name}: failed: {_said(error)}") from error
 
     def _checked(self, target: Any, state: Seen) -> np.ndarray:
         found = self._guarded(lambda: np.asarray(target, np.float32))
@@ -127,13 +128,29 @@ def _python(name: str) -> Callable[[], Act]:
         sys.path.insert(0, os.getcwd())  # as for `python -m`
     try:
         module = importlib.import_module(module_name)
-    except Exception as error:
-        text = " ".join(str(error).split())
-        raise ConfigError(f"{name}: cannot be imported: {type(error).__name__}: {text}") from None
+    except (Exception, SystemExit) as error:
+        hint = "; leave .py off" if module_name.endswith(".py") else ""
+        raise ConfigError(f"{name}: cannot be imported: {_said(error)}{hint}") from None
     found = getattr(module, attribute, None)
     if not callable(found):
         raise ConfigError(f"{name}: expected a function or class {attribute!r} in {module_name}")
     return found if isinstance(found, type) else lambda: found
+
+
+def _said(error: BaseException) -> str:
+    """What was raised in one line, and where in the user's own files."""
+    text = f"{type(error).__name__}: {' '.join(str(error).split())}"
+    frames = [x for x in traceback.extract_tb(error.__traceback__) if _is_the_users(x.filename)]
+    return (
+        f"{text} ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else text
+    )
+
+
+def _is_the_users(file: str) -> bool:
+    """Neither of this package, nor of Python and what is installed in it."""
+    installed = {Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib", "platlib")}
+    not_theirs = {Path(__file__).parents[1], *installed}
+    return not file.startswith("<") and not_theirs.isdisjoint(Path(file).parents)
 
 
 def _onnx(file: Path) -> Callable[[], Act]:
@@ -184,6 +201,8 @@ class _Exported:
 def _run(session: Any, values: Seen) -> list[np.ndarray]:
     """The results [B, ...] of a graph; one call a character where its leading axis is 1."""
     inputs = session.get_inputs()
+    if not inputs:
+        raise ValueError(f"a graph without inputs, expected some of {', '.join(NAMES)}")
     given = {x.name: np.asarray(values[x.name], np.float32) for x in inputs}
     if any(x.shape[0] != 1 for x in inputs):
         return session.run(None, given)
