@@ -124,8 +124,8 @@ def test_what_is_no_ground_is_said_in_one_line(tmp_path, values, settings, messa
     [
         ("a.tif", b"", r"expected a file that ends in \.png, \.npy"),
         ("a.npy", None, "no such file"),
-        ("a.npy", b"no array", "cannot be read: "),
-        ("a.npy", b"", "cannot be read: "),
+        ("a.npy", b"no array", r"cannot be read: it is no \.npy file; save it with numpy\.save$"),
+        ("a.npy", b"", r"cannot be read: it is no \.npy file"),
         ("a.png", b"no picture", "cannot be read: "),
         ("a.bin", np.array([9, 9, 0], np.int32).tobytes(), "says 9 x 9 heights, and 1 follow"),
         ("a.bin", b"\0\0", "cannot be read: "),
@@ -148,6 +148,9 @@ def test_a_picture_needs_a_height_and_one_channel(tmp_path):
     image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(tmp_path / "colour.png")
     with pytest.raises(ConfigError, match=r"uint8 of shape \(8, 8, 3\); save one grey channel"):
         own_heights(config(tmp_path / "colour.png", height_m=1.0))
+    image.fromarray(np.zeros((8, 8), np.uint8)).convert("P").save(tmp_path / "palette.png")
+    with pytest.raises(ConfigError, match=r"colours are of a palette; save it with one grey"):
+        own_heights(config(tmp_path / "palette.png", height_m=1.0))
 
 
 @pytest.mark.parametrize(

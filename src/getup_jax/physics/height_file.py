@@ -99,10 +99,16 @@ def _scaled(values: np.ndarray, config: TerrainConfig, where: str) -> np.ndarray
 
 def _read_png(path: Path) -> np.ndarray:
     image: Any = load_extra("PIL.Image", "plot", "terrain.heights").open(path)
+    if image.mode == "P":  # its numbers are places in a table of colours
+        raise ValueError("its colours are of a palette; save it with one grey channel")
     return np.asarray(image)[::-1]  # north is up
 
 
 def _read_npy(path: Path) -> np.ndarray:
+    with path.open("rb") as file:
+        head = file.read(len(np.lib.format.MAGIC_PREFIX))
+    if head != np.lib.format.MAGIC_PREFIX:
+        raise ValueError("it is no .npy file; save it with numpy.save")
     return np.load(path, mmap_mode="r", allow_pickle=False)
 
 
