@@ -21,6 +21,8 @@ policy, observe, start = (
 )
 facts = json.loads(policy.get_modelmeta().custom_metadata_map["getup_jax"])
 styles = {name: style for name, style in facts["styles"].items() if style["start"]}
+if args.style not in (None, *styles):
+    parser.error(f"--style: expected one of {', '.join(styles)}, got {args.style}")
 style = styles[args.style or next(iter(styles))]
 model = mujoco.MjModel.from_xml_path(str(args.policy.with_suffix(".xml")))
 data = mujoco.MjData(model)
