@@ -9,7 +9,7 @@ import pytest
 
 from getup_jax.config import PhysicsConfig
 from getup_jax.motion.clips import Clip, MotionError
-from getup_jax.motion.io.npz import read_arrays
+from getup_jax.motion.io.npz import names_in, read_arrays
 from getup_jax.motion.retarget.cache import read_npz, write_npz
 from getup_jax.motion.retarget.retarget import RetargetReport
 from getup_jax.physics.character import load_character
@@ -140,3 +140,9 @@ def test_a_missing_array_is_named_and_others_are_not_read(tmp_path):
         read_arrays(file, ("c",))
     with pytest.raises(MotionError, match="not a clip"):
         read_arrays(file, ("b",))
+
+
+@pytest.mark.parametrize("read", [names_in, lambda file: read_arrays(file, ("a",))])
+def test_a_file_that_is_not_there_is_said(tmp_path, read):
+    with pytest.raises(MotionError, match=r"gone\.npz: no such file$"):
+        read(tmp_path / "gone.npz")

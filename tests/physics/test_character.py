@@ -203,6 +203,8 @@ def test_unknown_names_list_the_right_ones(character):
 def test_a_missing_file_names_the_shipped_characters():
     with pytest.raises(ConfigError, match=r"physics\.character: no file .*nobody.*humanoid49"):
         load_character(PhysicsConfig(character="nobody"))
+    with pytest.raises(ConfigError, match=r"expected a file \.xml or \.yaml, got body\.urdf"):
+        load_character(PhysicsConfig(character="body.urdf"))
     with pytest.raises(ConfigError, match=r"no file /nowhere/x\.xml"):
         character_file("/nowhere/x.xml")
 

@@ -127,6 +127,8 @@ def character_file(name: str) -> Path:
     path = Path(name) if own else asset_path(f"{name}.xml")
     if not path.is_file():
         shipped = sorted(p.stem for p in asset_path().glob("*.xml"))
+        if not own and Path(name).suffix:
+            raise ConfigError(f"physics.character: expected a file .xml or {SUFFIX}, got {name}")
         raise ConfigError(f"physics.character: no file {path}; shipped characters: {shipped}")
     return path
 

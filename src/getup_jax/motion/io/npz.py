@@ -37,6 +37,8 @@ def read_arrays(file: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
             return {name: _read(archive, f"{name}.npy") for name in names}
     except MotionError:
         raise
+    except FileNotFoundError as error:
+        raise MotionError(f"{file}: no such file") from error
     except Exception as error:  # zip and npy headers fail in many ways
         raise MotionError(
             f"{file}: not a clip: expected an .npz file of getup-motion, getup-edit or SMPL; "
@@ -49,6 +51,8 @@ def names_in(file: Path) -> tuple[str, ...]:
     try:
         with zipfile.ZipFile(file) as archive:
             return tuple(name.removesuffix(".npy") for name in archive.namelist())
+    except FileNotFoundError as error:
+        raise MotionError(f"{file}: no such file") from error
     except Exception as error:  # zip fails in many ways
         raise MotionError(f"{file}: not a clip: expected an .npz file; save it again") from error
 
