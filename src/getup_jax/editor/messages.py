@@ -58,7 +58,7 @@ class Request:
 
 def read(message: str | bytes) -> Request:
     """The request in a message; MessageError or MotionError say what is wrong with it."""
-    content = b""
+    content: str | bytes = b""
     if isinstance(message, bytes):
         text, content = _split(message)
     else:
@@ -76,7 +76,8 @@ def read(message: str | bytes) -> Request:
         raise MessageError(f"message: unknown type {str(kind)[:40]!r}")
     number = _whole(said, "number", 2**31)
     if kind in ("load", "import"):
-        return Request(kind, number, name=_file_name(said), content=content or _text(said))
+        content = content if binary else _text(said)
+        return Request(kind, number, name=_file_name(said), content=content)
     if kind == "recording":
         return Request(kind, number, name=_text(said, "name"))
     if kind == "cancel":
