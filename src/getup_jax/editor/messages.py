@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import re
 import struct
 from typing import Any
 
@@ -21,14 +20,14 @@ from getup_jax.editor.simulate import Frames, Motion
 from getup_jax.editor.starts import ANYWHERE, Place
 from getup_jax.editor.takes import RATES, WHOLE, Cut
 from getup_jax.editor.verdict import verdict
-from getup_jax.motion.io.curve_file import CurveFile, parse
+from getup_jax.motion.io.curve_file import CurveFile, is_name, parse
 from getup_jax.physics.terrain_map import REGIONS
 
 MAX_TEXT_BYTES = 128_000
 MAX_FILE_BYTES = 32_000_000
 _LONGEST_S = 60.0  # of a motion
 SLOTS = 4  # variants that a page may show at once
-_FILE_NAME = re.compile(r"[\w ().+-]{1,100}")
+_MOST_LETTERS, _MARKS = 100, "_ ().+-"  # of a file's name
 _LENGTH = struct.Struct("<I")
 
 
@@ -170,7 +169,11 @@ def _whole(said: dict[str, Any], key: str, end: int, default: int | None = None)
 
 def _file_name(said: dict[str, Any]) -> str:
     name = said.get("name")
-    if not isinstance(name, str) or not _FILE_NAME.fullmatch(name) or name.startswith("."):
+    if (
+        not isinstance(name, str)
+        or not is_name(name, _MARKS, _MOST_LETTERS)
+        or name.startswith(".")
+    ):
         raise MessageError("name: expected the name of a file without its folder")
     return name
 

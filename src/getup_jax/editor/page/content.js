@@ -65,7 +65,7 @@ export function duration(now) { return now.curve.durations[0]; }
 export function keptDuration(seconds) { return clamp(Number(seconds.toFixed(2)) || DURATION_S[0], DURATION_S[0], DURATION_S[1]); }
 
 /** What a name may not have is left out. @param {string} text */
-export function keptName(text) { return text.normalize("NFC").replace(/[^\p{L}\p{N}_.@:~ -]/gu, "").slice(0, MOST_LETTERS); }
+export function keptName(text) { return text.normalize("NFC").replace(/[^\p{L}\p{M}\p{N}_.@:~ -]/gu, "").slice(0, MOST_LETTERS); }
 
 /** What the server needs for a motion: names change none. @param {Content} now */
 export function asked(now) {

@@ -63,7 +63,7 @@ export class Files {
 
   /** @param {File} file @param {number} projects opened when it was chosen */
   async read(file, projects) {
-    const name = file.name.replace(/[^\p{L}\p{N}_ ().+-]/gu, "_").replace(/^\.+/, "").slice(-100);
+    const name = file.name.replace(/[^\p{L}\p{M}\p{N}_ ().+-]/gu, "_").replace(/^\.+/, "").slice(-100);
     if (/\.getup\.json$/i.test(file.name)) return this.to.project(await file.text(), file.name);
     if (/\.ya?ml$/i.test(file.name)) {
       const answer = await this.link.ask({ type: "load", name, text: await file.text() });

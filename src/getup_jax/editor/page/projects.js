@@ -93,7 +93,7 @@ export class Projects {
   }
 
   export() {
-    download(`${this.own.name.replace(/[^\p{L}\p{N}_ ().+-]/gu, "_")}${SUFFIX}`, toText(this.own));
+    download(`${this.own.name.replace(/[^\p{L}\p{M}\p{N}_ ().+-]/gu, "_")}${SUFFIX}`, toText(this.own));
     say(`Project “${this.own.name}” exported`);
   }
 
