@@ -79,6 +79,7 @@ HUGE = "x" * (messages.MAX_TEXT_BYTES + 1)
         (pack({"type": "import", "number": 1, "name": "../a.bvh"}, b"x"), "without its folder"),
         (pack({"type": "import", "number": 1, "name": "a.exe"}, b"x"), "expected a file that ends"),
         (pack({"type": "import", "number": 1, "name": "a.npz"}, b"PK\x03\x04"), "not a clip"),
+        (pack({"type": "import", "number": 1, "name": "a.npz"}, b""), "not a clip"),
     ],
 )
 def test_a_message_that_makes_no_sense_is_answered_with_a_reason(site, message, text):

@@ -11,7 +11,7 @@ from getup_jax.core.resources import asset_path
 from getup_jax.motion import library
 from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.io import curve_file
-from getup_jax.motion.io.curve_file import dump, parse_text, read_curve_file
+from getup_jax.motion.io.curve_file import dump, is_name, parse_text, read_curve_file
 from getup_jax.physics.character import load_character
 
 TEXT = asset_path("curves", "prone_push_up_kneel.yaml").read_text(encoding="utf-8")
@@ -182,3 +182,8 @@ def test_a_config_takes_a_curve_file_as_a_source(character, tmp_path, monkeypatc
     path.write_text(changed(name="mine", start="nowhere"), encoding="utf-8")
     with pytest.raises(MotionError, match="mine: start: expected one of prone_quad"):
         library.load_motions(config, character)
+
+
+def test_a_name_has_letters_of_any_script_with_their_vowel_signs():
+    assert all(is_name(x, "_- ", 8) for x in ("हिन्दी", "straße_2", "起き上がる", "a b-c"))
+    assert not any(is_name(x, "_- ", 8) for x in ("", "a/b", "a\n", "'a'", "123456789", "a\u202eb"))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import re
 import struct
 from typing import Any
 
@@ -21,14 +20,14 @@ from getup_jax.editor.simulate import Frames, Motion
 from getup_jax.editor.starts import ANYWHERE, Place
 from getup_jax.editor.takes import RATES, WHOLE, Cut
 from getup_jax.editor.verdict import verdict
-from getup_jax.motion.io.curve_file import CurveFile, parse
+from getup_jax.motion.io.curve_file import CurveFile, is_name, parse
 from getup_jax.physics.terrain_map import REGIONS
 
 MAX_TEXT_BYTES = 128_000
 MAX_FILE_BYTES = 32_000_000
 _LONGEST_S = 60.0  # of a motion
 SLOTS = 4  # variants that a page may show at once
-_FILE_NAME = re.compile(r"[\w ().+-]{1,100}")
+_MOST_LETTERS, _MARKS = 100, "_ ().+-"  # of a file's name
 _LENGTH = struct.Struct("<I")
 
 
@@ -58,7 +57,7 @@ class Request:
 
 def read(message: str | bytes) -> Request:
     """The request in a message; MessageError or MotionError say what is wrong with it."""
-    content = b""
+    content: str | bytes = b""
     if isinstance(message, bytes):
         text, content = _split(message)
     else:
@@ -76,7 +75,8 @@ def read(message: str | bytes) -> Request:
         raise MessageError(f"message: unknown type {str(kind)[:40]!r}")
     number = _whole(said, "number", 2**31)
     if kind in ("load", "import"):
-        return Request(kind, number, name=_file_name(said), content=content or _text(said))
+        content = content if binary else _text(said)
+        return Request(kind, number, name=_file_name(said), content=content)
     if kind == "recording":
         return Request(kind, number, name=_text(said, "name"))
     if kind == "cancel":
@@ -169,7 +169,11 @@ def _whole(said: dict[str, Any], key: str, end: int, default: int | None = None)
 
 def _file_name(said: dict[str, Any]) -> str:
     name = said.get("name")
-    if not isinstance(name, str) or not _FILE_NAME.fullmatch(name) or name.startswith("."):
+    if (
+        not isinstance(name, str)
+        or not is_name(name, _MARKS, _MOST_LETTERS)
+        or name.startswith(".")
+    ):
         raise MessageError("name: expected the name of a file without its folder")
     return name
 

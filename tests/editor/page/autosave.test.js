@@ -82,3 +82,18 @@ test("what the browser does not store is said, and tried again with the next edi
   await autosave.save();
   assert.ok(!autosave.failed);
 });
+
+test("a storage that cannot be read is said, and opens nothing", async () => {
+  const storage = new Shared(), { autosave, said } = tab(storage);
+  storage.list = () => Promise.reject(new Error("broken"));
+  assert.equal(await autosave.last(), null);
+  assert.match(said.join(), /storage: broken/);
+});
+
+test("a project that cannot be read is said, and the next one is opened", async () => {
+  const storage = new Shared(), { autosave, said } = tab(storage), good = project(curve(), "good");
+  storage.list = async () => [{ id: "bad" }, { id: good.id }];
+  storage.read = async (id) => { if (id === "bad") throw new Error("“odd” cannot be read: keys"); return good; };
+  assert.equal(await autosave.last(), good);
+  assert.match(said.join(), /“odd” cannot be read/);
+});

@@ -120,6 +120,7 @@ test("an imported curve is compared with the styles that the policy knows, on ei
 test("fields keep what can be kept", () => {
   assert.deepEqual([100, -3, NaN, 3.456].map(keptDuration), [20, 0.5, 0.5, 3.46]);
   assert.equal(keptName("Tom's rise, late/low 2 ä_-.@:~"), "Toms rise latelow 2 ä_-.@:~");
+  assert.equal(keptName("हिन्दी"), "हिन्दी"); // vowel signs are marks, no letters
 });
 
 test("a request has no names: they change no motion", () => {

@@ -45,3 +45,23 @@ test("a refusal is an answer; a lost connection is none, and it is asked for aga
   await judging.update();
   assert.equal(judging.of(curve({ durations: [2] })), "✓ stands");
 });
+
+test("another server may have another policy: what the last one said is asked for again", async () => {
+  const s = store(), answers = [];
+  const wire = link(() => new Promise((resolve) => answers.push(resolve)));
+  const judging = new Judging(wire, s), end = () => new Promise((resolve) => setTimeout(resolve));
+  s.addImported(imported(curve({ durations: [1] })));
+  judging.update();
+  answers[0]({ success: true, verdict: "by the first" });
+  await end();
+  assert.equal(judging.of(curve({ durations: [1] })), "✓ by the first");
+  judging.begin();
+  assert.equal(judging.of(curve({ durations: [1] })), "");
+  judging.update();
+  judging.begin(); // the second one is gone before its answer is read
+  answers[1]({ success: true, verdict: "by the second" });
+  await end();
+  answers[2]({ success: false, verdict: "by the third" });
+  await end();
+  assert.equal(judging.of(curve({ durations: [1] })), "✗ by the third");
+});

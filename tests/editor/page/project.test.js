@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { curve, store } from "./samples.js";
 import * as edits from "../../../src/getup_jax/editor/page/edits.js";
-import { checked, fromText, project, toText } from "../../../src/getup_jax/editor/page/project.js";
+import { checked, fromText, MOST_IMPORTED, project, toText } from "../../../src/getup_jax/editor/page/project.js";
 
 function full() {
   const s = store();
@@ -54,4 +54,21 @@ test("every part is missed: a project without any key of it is refused or whole"
 test("names of files that are not allowed here are mended, not refused", () => {
   const odd = fromText(toText(project(curve({ name: "Tom's, a/b" }), "p")), "p");
   assert.equal(odd.variants[0].history.now.curve.name, "Toms ab");
+});
+
+test("whatever was imported can be read again: long names of files, and no more than there is room for", () => {
+  const s = store(), one = { curve: curve(), file: `${"ä😀".repeat(90)}.bvh`, recording: null };
+  assert.equal(s.addImported(Array(MOST_IMPORTED - 1).fill(one)), 0);
+  assert.equal(s.addImported([one, one, one]), 2);
+  assert.equal(checked(s.project).imported.length, MOST_IMPORTED);
+});
+
+test("whatever is pressed together can be read again", () => {
+  const s = store();
+  for (const [amount, seconds] of [[-1, 0.1], [1, 10]]) {
+    for (let i = 0; i < 60; i++) s.commit((now) => edits.shift(now, amount));
+    checked(s.project);
+    for (let i = 0; i < 30; i++) s.commit((now) => edits.stretch(edits.hold(now, 0.5, seconds), 0.2, 0.3, 0.1));
+    checked(s.project);
+  }
 });

@@ -102,3 +102,16 @@ test("what cannot be asked for is said not to be simulated", () => {
   s.commit(last(9));
   assert.equal(words(), "Not simulated: no connection");
 });
+
+test("a verdict of the last server is none of the next one, which may have another policy", () => {
+  const { wire, results, s, words } = page();
+  wire.frames(0, 1);
+  wire.result(0, 1, "by the first");
+  results.begin({ links: ["pelvis"] });
+  assert.equal(words(), "Simulating …");
+  s.tell("show");
+  assert.equal(wire.sent.length, 2);
+  wire.frames(0, 2);
+  wire.result(0, 2, "by the second");
+  assert.equal(words(), "By the second");
+});

@@ -1,5 +1,7 @@
 // Stores the project after every edit, one writing at a time: the newest wins.
 
+import { recalled, remember } from "./recall.js";
+
 /** @import { Project } from "./types.js" */
 
 const TAB = "getup-edit-project"; // the one that this tab, and the next new one, opens
@@ -21,21 +23,31 @@ export class Autosave {
     });
   }
 
-  /** The project that was open last in this tab, or else in any. @returns {Promise<Project | null>} */
+  /** The project that was open last in this tab, or else in any; null where there is none that can be read. @returns {Promise<Project | null>} */
   async last() {
-    for (const id of [kept(sessionStorage), kept(localStorage)]) {
-      const found = id && (await this.storage.read(id));
+    const open = [recalled("sessionStorage", TAB), recalled("localStorage", TAB)];
+    const listed = await this.tried(() => this.storage.list());
+    for (const id of new Set([...open, ...(listed ?? []).map((one) => one.id)])) {
+      const found = id && (await this.tried(() => this.storage.read(id)));
       if (found) return found;
     }
-    const [newest] = await this.storage.list();
-    return newest ? this.storage.read(newest.id) : null;
+    return null;
+  }
+
+  /** null, and a word on it, where the storage fails. @template T @param {() => Promise<T>} act @returns {Promise<T | null>} */
+  async tried(act) {
+    try { return await act(); } catch (error) {
+      this.say(`From the browser's storage: ${/** @type {Error} */ (error).message}.`, true);
+      return null;
+    }
   }
 
   /** Opens a project; one that is stored already is not stored anew, since another tab may have it too. @param {Project} project @param {boolean} fresh */
   open(project, fresh) {
     this.known = fresh ? null : project;
+    this.failed = false;
     this.store.open(project);
-    remember(project.id);
+    rememberOpen(project.id);
     return fresh ? this.save() : Promise.resolve();
   }
 
@@ -68,7 +80,7 @@ export class Autosave {
     const { id, name, revision, saved } = written, newest = this.store.project === project;
     this.store.change({ id, revision, saved, name: id === project.id ? this.store.project.name : name });
     if (newest) this.known = this.store.project;
-    remember(id);
+    rememberOpen(id);
     document.body.dataset.saved = String(revision);
     if (id !== project.id) {
       this.say(`“${project.name}” was changed in another tab; yours goes on as “${name}”.`, true);
@@ -77,15 +89,8 @@ export class Autosave {
   }
 }
 
-/** @param {globalThis.Storage} where */
-function kept(where) {
-  try { return where.getItem(TAB); } catch { return null; }
-}
-
 /** @param {string} id */
-export function remember(id) {
-  try {
-    sessionStorage.setItem(TAB, id);
-    localStorage.setItem(TAB, id);
-  } catch { /* a browser that keeps nothing says so elsewhere */ }
+function rememberOpen(id) {
+  remember("sessionStorage", TAB, id);
+  remember("localStorage", TAB, id);
 }

@@ -9,6 +9,7 @@ import { FEATURES, sample } from "./spline.js";
 export const DURATION_S = [0.5, 20];
 const POINT_LIMITS = { height: [-0.5, 2.5], side_angle: [-90, 270], front_angle: [-90, 270] }; // of curve files
 const MOST_LETTERS = 80;
+const LEAST_ROOM = 1e-4; // between two keys, as a share of the duration
 
 /** @param {Curve} curve @returns {Content} */
 export function contentOf(curve) {
@@ -32,11 +33,21 @@ export function withKeys(now, changed) {
   for (const feature of FEATURES) {
     const drawnKeys = changed[feature];
     if (!drawnKeys) continue;
-    keys[feature] = drawnKeys.map((key) => ({ ...key, value: kept(feature, key.value) }));
+    keys[feature] = rising(drawnKeys).map((key) => ({ ...key, value: kept(feature, key.value) }));
     const [low, high] = POINT_LIMITS[feature];
     curve[feature] = fit(keys[feature]).map((v) => clamp(Number(v.toFixed(KINDS[feature].digits + 1)), low, high));
   }
   return { ...now, keys, curve };
+}
+
+/** Keys whose times rise from 0 to 1 exactly, whatever was rounded: what was pressed together, as by a shift that is made again and again, keeps a little room. @param {Key[]} keys */
+function rising(keys) {
+  const end = keys.length - 1, room = Math.min(LEAST_ROOM, 1 / (2 * keys.length));
+  let before = 0;
+  return keys.map((key, i) => {
+    before = i === 0 ? 0 : i === end ? 1 : clamp(key.time, before + room, 1 - (end - i) * room);
+    return before === key.time ? key : { ...key, time: before };
+  });
 }
 
 /** How far the curve that the policy sees is from the drawn one at most. @param {Content} now @param {Feature} feature */
@@ -54,7 +65,7 @@ export function duration(now) { return now.curve.durations[0]; }
 export function keptDuration(seconds) { return clamp(Number(seconds.toFixed(2)) || DURATION_S[0], DURATION_S[0], DURATION_S[1]); }
 
 /** What a name may not have is left out. @param {string} text */
-export function keptName(text) { return text.normalize("NFC").replace(/[^\p{L}\p{N}_.@:~ -]/gu, "").slice(0, MOST_LETTERS); }
+export function keptName(text) { return text.normalize("NFC").replace(/[^\p{L}\p{M}\p{N}_.@:~ -]/gu, "").slice(0, MOST_LETTERS); }
 
 /** What the server needs for a motion: names change none. @param {Content} now */
 export function asked(now) {

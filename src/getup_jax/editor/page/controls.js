@@ -24,10 +24,11 @@ export class Controls {
     band.addEventListener("change", onGuide);
     start.addEventListener("change", () => this.startFrom(start.value));
     region.addEventListener("change", () => store.commit((now) => ({ ...now, region: Number(region.value) })));
-    place.addEventListener("change", () => this.place(Number(place.value)));
+    // a field that is left empty goes back to what it was
+    place.addEventListener("change", () => (place.value === "" ? this.show() : this.place(Number(place.value))));
     slider.addEventListener("input", () => store.live((now) => edits.last(now, Number(slider.value))));
     slider.addEventListener("change", () => store.commit(null, { tag: "duration" }));
-    seconds.addEventListener("change", () => this.last(Number(seconds.value)));
+    seconds.addEventListener("change", () => (seconds.value === "" ? this.show() : this.last(Number(seconds.value))));
     shift.addEventListener("input", () => store.live((now) => edits.shift(now, Number(shift.value))));
     shift.addEventListener("change", () => {
       shift.value = 0;
@@ -126,7 +127,7 @@ export class Controls {
     const { elements, store } = this, { now, current } = store, seconds = duration(now);
     if (document.activeElement !== elements.name) elements.name.value = now.curve.name;
     elements.duration.value = seconds;
-    if (document.activeElement !== elements.seconds) elements.seconds.value = seconds;
+    if (document.activeElement !== elements.seconds || elements.seconds.value === "") elements.seconds.value = seconds;
     elements.region.value = now.region;
     if (document.activeElement !== elements.place) elements.place.value = now.place + 1;
     elements.undo.disabled = !current.history.past.length && !store.draft;

@@ -24,6 +24,7 @@ export class Exports {
     /** @type {number | null} the request under way */
     this.number = null;
     $("export").addEventListener("click", () => this.open());
+    $("dialog").addEventListener("close", () => { if (this.number !== null) this.cancel(); }); // by Escape
     link.addEventListener("progress", (/** @type {any} */ { detail }) => {
       if (detail.number === this.number && $("export-progress")) $("export-progress").value = detail.share;
     });
@@ -74,7 +75,8 @@ export class Exports {
   async go() {
     const request = this.request();
     if (request.format === "png") return this.still(request.name);
-    $("export-go").disabled = true;
+    const button = $("export-go");
+    button.disabled = true;
     $("export-progress").hidden = false;
     try {
       const answer = this.link.ask(request);
@@ -84,7 +86,7 @@ export class Exports {
       say(`${file.name} exported`);
     } catch (error) { say(/** @type {Error} */ (error).message, true); }
     this.number = null;
-    $("dialog").close();
+    if (button.isConnected) $("dialog").close();
   }
 
   /** @param {string} name */

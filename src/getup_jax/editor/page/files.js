@@ -5,6 +5,8 @@ import { say } from "./notice.js";
 
 /** @import { Curve, Recording } from "./types.js" */
 
+const MOST_REASONS = 3; // that one line has room for
+
 export class Files {
   /** @param {import("./link.js").Link} link @param {import("./store.js").Store} store @param {{ opened: (curves: Curve[], file: string) => void, imported: (curves: Curve[], recordings: (Recording | null)[], file: string) => void, project: (text: string, file: string) => void, ground: () => { region?: string, place?: number } }} to ground: the curve's region and place, for its file */
   constructor(link, store, to) {
@@ -12,6 +14,11 @@ export class Files {
     this.store = store;
     this.to = to;
     this.queue = Promise.resolve();
+    this.left = 0; // files to be read
+    this.projects = 0; // that were opened: a motion stays out of one that was opened after it was chosen
+    store.addEventListener("change", (/** @type {any} */ { detail }) => { if (detail.kind === "project") this.projects += 1; });
+    /** @type {string[]} */
+    this.refused = []; // why, of the files that are read one after the other
     $("save").addEventListener("click", () => this.save());
     $("open").addEventListener("click", () => $("file-curve").click());
     $("import").addEventListener("click", () => $("file-motion").click());
@@ -38,23 +45,46 @@ export class Files {
 
   /** One after the other, however many are given and whenever. @param {File[]} files */
   take(files) {
+    const { projects } = this;
+    this.left += files.length;
     for (const file of files) {
-      this.queue = this.queue.then(() => this.read(file)).catch((error) => say(error.message, true));
+      const read = this.queue.then(() => this.read(file, projects));
+      this.queue = read.catch((error) => { this.refused.push(error.message); }).then(() => this.done());
     }
   }
 
-  /** @param {File} file */
-  async read(file) {
-    const name = file.name.replace(/[^\p{L}\p{N}_ ().+-]/gu, "_").replace(/^\.+/, "").slice(-100);
+  /** What was refused is said when all are read, so that the next file's words do not hide it. */
+  done() {
+    this.left -= 1;
+    if (this.left || !this.refused.length) return;
+    say(refusals(this.refused), true);
+    this.refused = [];
+  }
+
+  /** @param {File} file @param {number} projects opened when it was chosen */
+  async read(file, projects) {
+    const name = file.name.replace(/[^\p{L}\p{M}\p{N}_ ().+-]/gu, "_").replace(/^\.+/, "").slice(-100);
     if (/\.getup\.json$/i.test(file.name)) return this.to.project(await file.text(), file.name);
     if (/\.ya?ml$/i.test(file.name)) {
       const answer = await this.link.ask({ type: "load", name, text: await file.text() });
       return this.to.opened(answer.curves, file.name);
     }
-    say(`Reading ${file.name} …`);
+    const another = () => {
+      if (projects !== this.projects) throw new Error(`${file.name}: not imported, since another project was opened meanwhile; import it anew.`);
+    };
+    another();
+    say(`Reading ${file.name} …${this.left > 1 ? ` (${this.left - 1} more)` : ""}`);
     const answer = await this.link.ask({ type: "import", name }, await file.arrayBuffer());
+    another();
     return this.to.imported(answer.curves, recordings(answer), file.name);
   }
+}
+
+/** One line on all that was refused. @param {string[]} reasons */
+export function refusals(reasons) {
+  const more = reasons.length > MOST_REASONS ? ` · and ${reasons.length - MOST_REASONS} more` : "";
+  const count = reasons.length > 1 ? `${reasons.length} files were refused. ` : "";
+  return `${count}${reasons.slice(0, MOST_REASONS).join(" · ")}${more}`;
 }
 
 /** The motions behind the curves, which follow each other in the payload. @param {any} answer @returns {(Recording | null)[]} */

@@ -11,6 +11,13 @@ export class Judging extends EventTarget {
     /** @type {Map<string, string>} by the curve */
     this.words = new Map();
     this.busy = false;
+    this.server = 0; // counts the servers: another one may have another policy
+  }
+
+  /** A server that knows nothing of what was said before. */
+  begin() {
+    this.server += 1;
+    this.words.clear();
   }
 
   /** What came of a curve, in a few words; none yet: an empty text. @param {Curve} curve */
@@ -21,7 +28,8 @@ export class Judging extends EventTarget {
     if (this.busy) return;
     this.busy = true;
     for (let next = this.next(); next && this.link.open; next = this.next()) {
-      const said = await this.judge(next);
+      const { server } = this, said = await this.judge(next);
+      if (server !== this.server) continue;
       if (said === null) break;
       this.words.set(keyOf(next), said);
       this.dispatchEvent(new Event("change"));

@@ -15,8 +15,9 @@ import { Latency } from "./latency.js";
 import { Link } from "./link.js";
 import { say } from "./notice.js";
 import { Player } from "./player.js";
-import { project } from "./project.js";
+import { MOST_IMPORTED, project } from "./project.js";
 import { Projects } from "./projects.js";
+import { recalled, remember } from "./recall.js";
 import { Report, wishWords } from "./report.js";
 import { Results } from "./results.js";
 import { help, listen } from "./shortcuts.js";
@@ -70,8 +71,9 @@ new Exports(link, store, { scene: () => scene, range: () => model.range, still: 
 const files = new Files(link, store, {
   opened: (curves, file) => taken(curves, file),
   imported(curves, recordings, file) {
-    store.addImported(curves.map((curve, i) => ({ curve, file, recording: recordings[i] ?? null })));
+    const left = store.addImported(curves.map((curve, i) => ({ curve, file, recording: recordings[i] ?? null })));
     taken(curves, file);
+    if (left) say(`${file}: a project holds ${MOST_IMPORTED} imported motions; ${left} of this file are left out. Begin a new project for them.`, true);
   },
   project: (text, file) => projects.import(text, file),
   ground: () => (scene.terrain ? { region: scene.terrain.regions[store.now.region], place: store.now.place + 1 } : {}),
@@ -109,6 +111,7 @@ async function ready(description) {
   controls.fill(scene);
   tools.fillPoses(scene);
   results.begin(scene);
+  judging.begin();
   if (store.project) return store.tell("show");
   autosave.open(last ?? project(scene.curves[0], "My get-up"), !last);
   // the curves first: the server works while the view is made
@@ -214,10 +217,10 @@ firstVisit();
 /** Three lines, once. */
 function firstVisit() {
   const key = "getup-edit-visited";
-  try { $("hint").hidden = localStorage.getItem(key) !== null; } catch { return; }
+  $("hint").hidden = recalled("localStorage", key) !== null;
   $("hint-close").addEventListener("click", () => {
     $("hint").hidden = true;
-    localStorage.setItem(key, "1");
+    remember("localStorage", key, "1");
   });
 }
 

@@ -12,7 +12,8 @@ import { FEATURES, POINTS } from "./spline.js";
 export const FORMAT = 1;
 export const SUFFIX = ".getup.json";
 export const SLOTS = 4;
-const MOST_KEYS = 200, MOST_STEPS = 200, MOST_IMPORTED = 200;
+export const MOST_IMPORTED = 200, MOST_LETTERS = 200;
+const MOST_KEYS = 1000, MOST_STEPS = 200;
 
 /** @param {Curve} curve @param {string} name @returns {Project} */
 export function project(curve, name) {
@@ -138,6 +139,6 @@ function whole(x, where, end) {
 
 /** @param {any} x @param {string} where @returns {string} */
 function text(x, where) {
-  if (typeof x !== "string" || x.length > 200) throw new Error(`${where}: expected a text, got ${JSON.stringify(x)}`);
+  if (typeof x !== "string" || x.length > MOST_LETTERS) throw new Error(`${where}: expected a text, got ${JSON.stringify(x)}`);
   return x;
 }

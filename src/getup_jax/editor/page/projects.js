@@ -20,7 +20,7 @@ export class Projects {
 
   async show() {
     await this.autosave.writing;
-    const listed = await this.storage.list(), dialog = $("dialog");
+    const listed = (await this.autosave.tried(() => this.storage.list())) ?? [], dialog = $("dialog");
     const rename = (/** @type {Event} */ event) => this.rename(/** @type {HTMLInputElement} */ (event.target));
     dialog.replaceChildren(
       el("h2", { id: "dialog-title" }, "Projects"),
@@ -59,14 +59,20 @@ export class Projects {
   /** @param {string} id */
   async load(id) {
     await this.autosave.save();
-    const found = await this.storage.read(id);
-    if (found) this.open(found, false);
-    else say("This project cannot be read any more.", true);
+    const found = await this.autosave.tried(() => this.storage.read(id));
+    if (found) await this.open(found, false);
   }
 
   /** @param {Project} opened @param {boolean} fresh not stored yet */
   async open(opened, fresh = true) {
     await this.autosave.save(); // the last edit of the one that is left
+    if (!this.autosave.failed) return this.change(opened, fresh);
+    const words = `“${this.own.name}” is not stored: export it first, or its last edits are lost.`;
+    say(words, true, { words: "Leave it", act: () => this.change(opened, fresh) });
+  }
+
+  /** @param {Project} opened @param {boolean} fresh */
+  async change(opened, fresh) {
     await this.autosave.open(opened, fresh);
     $("dialog").close();
     say(`Project “${this.own.name}”`);
@@ -74,17 +80,20 @@ export class Projects {
 
   /** @param {string} id @param {string} name */
   async remove(id, name) {
-    const found = await this.storage.read(id);
-    await this.storage.remove(id);
+    const found = await this.autosave.tried(() => this.storage.read(id));
+    const removed = await this.autosave.tried(async () => {
+      await this.storage.remove(id);
+      return true;
+    });
+    if (!removed) return;
     await this.show();
-    const back = async () => {
-      if (found) await this.storage.write({ ...found, revision: 0 });
-    };
+    if (!found) return say(`Project “${name}” is removed.`);
+    const back = () => this.autosave.tried(() => this.storage.write({ ...found, revision: 0 }));
     say(`Project “${name}” is removed.`, false, { words: "Put it back", act: back });
   }
 
   export() {
-    download(`${this.own.name.replace(/[^\p{L}\p{N}_ ().+-]/gu, "_")}${SUFFIX}`, toText(this.own));
+    download(`${this.own.name.replace(/[^\p{L}\p{M}\p{N}_ ().+-]/gu, "_")}${SUFFIX}`, toText(this.own));
     say(`Project “${this.own.name}” exported`);
   }
 

@@ -29,10 +29,12 @@ export class Results extends EventTarget {
     link.addEventListener("error", (/** @type {any} */ { detail }) => this.addError(detail));
   }
 
-  /** A server that knows nothing of earlier requests. @param {{ links: string[] }} scene */
+  /** A server that knows nothing of earlier requests, and may have another policy: what is shown stays until
+   * its own motion is there, but is no answer to what is edited now. @param {{ links: string[] }} scene */
   begin(scene) {
     this.links = scene.links.length;
     this.asked.clear();
+    for (const [slot, result] of this.shown) this.shown.set(slot, { ...result, text: "" });
   }
 
   /** Another project has nothing to do with the motions of the last one. */

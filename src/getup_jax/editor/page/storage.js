@@ -40,10 +40,12 @@ export class Storage {
     return listed.sort((a, b) => b.saved - a.saved);
   }
 
-  /** null where there is none that can be read. @param {string} id @returns {Promise<Project | null>} */
+  /** null where there is none; an Error where it cannot be read. @param {string} id @returns {Promise<Project | null>} */
   async read(id) {
     const found = this.database ? await done(this.database.transaction(WHOLE).objectStore(WHOLE).get(id)) : this.memory.get(id);
-    try { return found ? checked(found) : null; } catch { return null; }
+    try { return found ? checked(found) : null; } catch (error) {
+      throw new Error(`“${found.name}” cannot be read: ${/** @type {Error} */ (error).message}`);
+    }
   }
 
   /** Stores a project; gives it as it is stored now: one revision later, or a copy. @param {Project} project @returns {Promise<Project>} */

@@ -6,7 +6,7 @@
 
 import { duration } from "./content.js";
 import * as history from "./history.js";
-import { SLOTS } from "./project.js";
+import { MOST_IMPORTED, MOST_LETTERS, SLOTS } from "./project.js";
 
 /** @import { Content, Imported, Project, Variant } from "./types.js" */
 
@@ -120,10 +120,13 @@ export class Store extends EventTarget {
     this.tell("show");
   }
 
-  /** @param {Imported[]} imported */
+  /** Adds as many as a project may hold, and gives the number of those that are left out. @param {Imported[]} imported */
   addImported(imported) {
-    this.change({ imported: [.../** @type {Project} */ (this.project).imported, ...imported] });
+    const all = [.../** @type {Project} */ (this.project).imported, ...imported];
+    const kept = all.slice(0, MOST_IMPORTED).map((one) => ({ ...one, file: one.file.slice(0, MOST_LETTERS) }));
+    this.change({ imported: kept });
     this.tell("show");
+    return all.length - kept.length;
   }
 
   /** @param {string} kind @param {number | null} at */

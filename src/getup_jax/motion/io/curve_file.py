@@ -17,8 +17,8 @@ Configs (`motion.source`), `getup-eval --curves` and the curve editor take the s
 from __future__ import annotations
 
 import dataclasses
-import re
 import reprlib
+import unicodedata
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,7 @@ _MAX_BYTES = 64_000
 _MOTIONS, _EITHER = (".bvh", ".amc", ".asf", ".npz"), (".json", ".txt")
 _MAX_DURATIONS = 16
 _MOST_PLACES = 10_000
-_NAME = re.compile(r"[\w.@:~ -]{1,80}")
+_MOST_LETTERS, _MARKS = 80, "_.@:~ -"  # of a name: how long it is, what is in it beside letters
 _SHORT = reprlib.Repr()  # of what came instead
 _SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxstring = 2, 4, 100
 _COMMENTS = {
@@ -142,6 +142,15 @@ def parse_text(text: str | bytes, where: str) -> CurveFile:
     return parse(content, where)
 
 
+def is_name(text: str, marks: str, most: int) -> bool:
+    """Whether it has 1 to `most` letters and digits of any script, and these marks."""
+
+    def fits(letter: str) -> bool:  # vowel signs of many scripts are combining, and no letters
+        return letter.isalnum() or letter in marks or unicodedata.category(letter)[0] == "M"
+
+    return 1 <= len(text) <= most and all(map(fits, text))
+
+
 def parse(content: Any, where: str) -> CurveFile:
     """The style in the content of a file, however it came; every value is checked."""
     if not isinstance(content, Mapping) or set(content) - set(OPTIONAL) != set(KEYS):
@@ -149,7 +158,7 @@ def parse(content: Any, where: str) -> CurveFile:
         found = ", ".join(_shown(k).strip("'") for k in content) if mapping else content
         raise MotionError(f"{where}: expected the keys {', '.join(KEYS)}, got {_shown(found)}")
     for key in ("name", "strategy", "start"):
-        if not isinstance(content[key], str) or not _NAME.fullmatch(content[key]):
+        if not isinstance(content[key], str) or not is_name(content[key], _MARKS, _MOST_LETTERS):
             raise _wrong(where, key, "up to 80 letters, digits, spaces and _-.@:~", content[key])
     durations = _numbers(content["durations"], where, "durations", DURATION_S)
     if not 1 <= len(durations) <= _MAX_DURATIONS:

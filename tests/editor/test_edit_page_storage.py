@@ -1,0 +1,79 @@
+"""The editor in a browser that keeps nothing, has no room left, or cannot read what it kept."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from browser import BROWSER, HEIGHT, drag, edited, judged, opened, says, value
+
+pytestmark = BROWSER
+
+_FORBIDDEN = """
+for (const name of ["localStorage", "sessionStorage"]) {
+  Object.defineProperty(window, name, { get() { throw new DOMException("denied"); } });
+}
+IDBFactory.prototype.open = () => { throw new DOMException("denied"); };
+"""
+_UNREADABLE = """
+for (const name of ["get", "getAll"]) {
+  IDBObjectStore.prototype[name] = () => { throw new DOMException("broken"); };
+}
+"""
+_FULL = """
+window.put = IDBObjectStore.prototype.put;
+window.fill = () => { IDBObjectStore.prototype.put = () => { throw new DOMException("full"); }; };
+window.empty = () => { IDBObjectStore.prototype.put = window.put; };
+"""
+
+
+@contextlib.contextmanager
+def opened_after(address: str, script: str) -> Iterator[Any]:
+    """The page in a browser that a script has changed before."""
+    with opened(address) as first:
+        context = first.context.browser.new_context()
+        context.add_init_script(script)
+        page, problems = context.new_page(), []
+        page.on("pageerror", lambda error: problems.append(str(error)))
+        page.goto(address)
+        page.wait_for_selector("body[data-shown]", timeout=60_000)
+        yield page
+        assert not problems
+
+
+@pytest.mark.parametrize(
+    ("script", "words"), [(_FORBIDDEN, "keeps nothing"), (_UNREADABLE, "(broken); export it")]
+)
+def test_a_browser_that_keeps_nothing_edits_all_the_same(page_server, script, words):
+    with opened_after(page_server[0], script) as page:
+        says(page, "toast", words)
+        edited(page, lambda: drag(page, HEIGHT, 4, 30))
+        assert judged(page)
+        before = page.evaluate("document.documentElement.dataset.theme")
+        page.click("#theme")
+        assert page.evaluate("document.documentElement.dataset.theme") != before
+        page.click("#project")
+        with page.expect_download():
+            page.click("#project-export")
+
+
+def test_a_project_that_is_not_stored_is_not_left_without_a_word(page_server):
+    with opened_after(page_server[0], _FULL) as page:
+        page.evaluate("fill()")
+        edited(page, lambda: drag(page, HEIGHT, 4, 30))
+        mine = value(page, HEIGHT, 4)
+        says(page, "toast", "did not store the project (full)")
+        page.click("#project")
+        page.click("#project-new")
+        says(page, "toast", "is not stored: export it first")
+        assert page.inner_text("#project") == "My get-up"
+        assert value(page, HEIGHT, 4) == mine
+        page.evaluate("empty()")
+        page.click("#project-new")
+        says(page, "project", "My get-up 2")
+        page.click("#project")
+        page.click("#project-list li:has-text('My get-up') .wide[aria-current=false]")
+        page.wait_for_function("() => !document.getElementById('dialog').open")
+        assert value(page, HEIGHT, 4) == mine
