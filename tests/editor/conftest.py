@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from browser import served
 from edit_running import Quick, running
-from edit_samples import make_curve, make_simulator
+from edit_samples import make_curve, make_simulator, whole_motion
 
 from getup_jax.editor.simulate import Motion, Simulator
 from getup_jax.runtime.checkpoint import LoadedPolicy
@@ -24,7 +24,7 @@ def simulator(tiny) -> Simulator:
 
 @pytest.fixture(scope="session")
 def motion(simulator) -> Motion:
-    return simulator.finish(make_curve())
+    return whole_motion(simulator, make_curve())
 
 
 @pytest.fixture(scope="session")

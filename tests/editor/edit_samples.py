@@ -11,7 +11,8 @@ from tiny_task import getups, neutral_prior
 from eval_samples import SMALL, save_policy
 from getup_jax.config import Config, TerrainConfig
 from getup_jax.editor.options import edit_parser
-from getup_jax.editor.simulate import Simulator, editor_config
+from getup_jax.editor.simulate import Motion, Simulator, editor_config
+from getup_jax.editor.starts import ANYWHERE, Place
 from getup_jax.envs.getup.build import BuiltTask, assemble
 from getup_jax.motion.io.curve_file import CurveFile
 from getup_jax.physics.character import load_character
@@ -25,6 +26,13 @@ def make_curve(end_height: float = 1.4, start: str = "clip") -> CurveFile:
     share = np.linspace(0.0, 1.0, 9)[:, None]
     first, last = np.array([0.12, 90.0, 1.0]), np.array([end_height, 90.0, 90.0])
     return CurveFile("line", "other", start, (SECONDS,), first + share * (last - first))
+
+
+def whole_motion(simulator: Simulator, curve: CurveFile, place: Place = ANYWHERE) -> Motion:
+    """What comes last of a simulation."""
+    *_, motion = simulator.run(curve, place)
+    assert isinstance(motion, Motion)
+    return motion
 
 
 def make_task(config: Config) -> BuiltTask:

@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 import pytest
-from edit_samples import make_curve
+from edit_samples import make_curve, whole_motion
 
 from getup_jax.editor import messages
 from getup_jax.editor.messages import Request
@@ -133,7 +133,7 @@ def test_a_verdict_says_how_the_episode_ended(motion):
 
 
 def test_what_nobody_watches_is_simulated_between_edits_and_is_the_same(session, simulator):
-    wanted = simulator.finish(make_curve(1.1))
+    wanted = whole_motion(simulator, make_curve(1.1))
     slow, box, found = session.simulator, Box(), []
     other = threading.Thread(
         target=lambda: found.append(session.motion(Request("judge", 1, 0, make_curve(1.1))))
@@ -149,7 +149,7 @@ def test_what_nobody_watches_is_simulated_between_edits_and_is_the_same(session,
 
 def test_chunks_of_two_motions_may_take_turns(simulator):
     curves = make_curve(1.1), make_curve(1.4)
-    wanted = [simulator.finish(curve).frames.qpos for curve in curves]
+    wanted = [whole_motion(simulator, curve).frames.qpos for curve in curves]
     runs = [simulator.run(curve) for curve in curves]
     found = [[], []]
     for parts in zip(*runs, strict=True):

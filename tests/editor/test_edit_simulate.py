@@ -5,7 +5,7 @@ import dataclasses
 import mujoco
 import numpy as np
 import pytest
-from edit_samples import SECONDS, make_curve, make_ground_simulator
+from edit_samples import SECONDS, make_curve, make_ground_simulator, whole_motion
 from ground_samples import TERRAIN
 from tiny_task import getups, neutral_prior
 
@@ -46,7 +46,7 @@ def test_it_is_what_an_evaluation_of_the_curve_file_does_to_the_last_bit(simulat
     *_, rows = task.world.pool.table.shape
     plan = make_plan(Scenario(), 1, len(styles), rows)
     trace = run_episodes(task, learner, policy, plan, lambda done: None).trace
-    motion, steps = simulator.finish(curve), int(trace.running.sum())
+    motion, steps = whole_motion(simulator, curve), int(trace.running.sum())
     assert steps == motion.frames.running.sum() >= CHUNK - 1
     np.testing.assert_array_equal(motion.frames.qpos[:steps], trace.qpos[:steps, 0])
     np.testing.assert_array_equal(motion.target[:steps], trace.target[:steps, 0])
@@ -56,10 +56,10 @@ def test_it_is_what_an_evaluation_of_the_curve_file_does_to_the_last_bit(simulat
 
 
 def test_an_edit_changes_the_target_and_nothing_is_compiled_again(simulator):
-    first = simulator.finish(make_curve(1.4))
+    first = whole_motion(simulator, make_curve(1.4))
     compiled = simulator.advance._cache_size()
-    second = simulator.finish(make_curve(0.4))
-    longer = simulator.finish(dataclasses.replace(make_curve(), durations=(2.0,)))
+    second = whole_motion(simulator, make_curve(0.4))
+    longer = whole_motion(simulator, dataclasses.replace(make_curve(), durations=(2.0,)))
     assert second.target[-1, 0] == pytest.approx(0.4)
     assert first.target[-1, 0] == pytest.approx(1.4)
     assert len(longer.time) > len(first.time)
@@ -67,15 +67,15 @@ def test_an_edit_changes_the_target_and_nothing_is_compiled_again(simulator):
 
 
 def test_starts_may_be_mirrored_and_the_gap_to_the_curve_is_known(simulator):
-    plain = simulator.finish(make_curve())
-    other = simulator.finish(make_curve(start="mirrored clip"))
+    plain = whole_motion(simulator, make_curve())
+    other = whole_motion(simulator, make_curve(start="mirrored clip"))
     assert plain.start_gap_rad < 0.1
     assert other.frames.qpos.shape == plain.frames.qpos.shape
     front = np.array([0.0, 0.0, 60.0])
     turned = dataclasses.replace(make_curve(), values=make_curve().values + front)
     assert simulator.starts.gap(turned) == pytest.approx(np.radians(60), abs=0.1)
     with pytest.raises(MotionError, match="start: expected one of clip, got 'nothing'"):
-        simulator.finish(make_curve(start="nothing"))
+        whole_motion(simulator, make_curve(start="nothing"))
 
 
 def test_a_reference_motion_is_described_as_a_person_would_write_it(simulator):
@@ -101,7 +101,7 @@ def test_on_irregular_ground_the_place_chooses_the_start(tiny, tmp_path, monkeyp
         np.testing.assert_array_equal(got.kinematics.qpos, expected.kinematics.qpos)
     with pytest.raises(MotionError, match="on irregular ground expected one of clip"):
         starts.pool(make_curve(start="mirrored clip"), Place())
-    motion = simulator.finish(curve, Place(3, 1))
+    motion = whole_motion(simulator, curve, Place(3, 1))
     around = ground(simulator, motion.frames.links[0, 0, :2])
     assert around is not None
     assert np.ptp(around["heights"]) > 0.05

@@ -20,7 +20,7 @@ from getup_jax.editor.simulate import Frames, Motion
 from getup_jax.editor.starts import ANYWHERE, Place
 from getup_jax.editor.takes import RATES, WHOLE, Cut
 from getup_jax.editor.verdict import verdict
-from getup_jax.motion.io.curve_file import CurveFile, is_name, parse
+from getup_jax.motion.io.curve_file import MOST_PLACES, CurveFile, is_name, parse
 from getup_jax.physics.terrain_map import REGIONS
 
 MAX_TEXT_BYTES = 128_000
@@ -85,7 +85,7 @@ def read(message: str | bytes) -> Request:
     form = said.get("format", "")
     if kind == "export" and form not in FORMATS:
         raise MessageError(f"format: expected one of {', '.join(FORMATS)}")
-    place = Place(_whole(said, "region", len(REGIONS), 0), _whole(said, "place", 10_000, 0))
+    place = Place(_whole(said, "region", len(REGIONS), 0), _whole(said, "place", MOST_PLACES, 0))
     slot = _whole(said, "slot", SLOTS, 0)
     return Request(kind, number, slot, curve, place, form, _cut(said))
 

@@ -153,12 +153,6 @@ class Simulator:
             start_pose=begin,
         )
 
-    def finish(self, curve: CurveFile, place: Place = ANYWHERE) -> Motion:
-        """The whole motion at once."""
-        *_, motion = self.run(curve, place)
-        assert isinstance(motion, Motion)
-        return motion
-
     def _frames(self, first: int, trace: Trace, data: mujoco.MjData) -> Frames:
         qpos = trace.qpos[:, 0]
         return Frames(

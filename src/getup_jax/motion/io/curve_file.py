@@ -44,7 +44,7 @@ LIMITS = ((-0.5, 2.5), (-90.0, 270.0), (-90.0, 270.0))
 _MAX_BYTES = 64_000
 _MOTIONS, _EITHER = (".bvh", ".amc", ".asf", ".npz"), (".json", ".txt")
 _MAX_DURATIONS = 16
-_MOST_PLACES = 10_000
+MOST_PLACES = 10_000
 _MOST_LETTERS, _MARKS = 80, "_.@:~ -"  # of a name: how long it is, what is in it beside letters
 _SHORT = reprlib.Repr()  # of what came instead
 _SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxstring = 2, 4, 100
@@ -207,8 +207,8 @@ def _ground(content: Mapping, where: str) -> tuple[str, int]:
     region, place = content.get("region"), content.get("place")
     if region not in REGIONS:
         raise _wrong(where, "region", f"one of {', '.join(REGIONS)}", region)
-    if isinstance(place, bool) or not isinstance(place, int) or not 1 <= place <= _MOST_PLACES:
-        raise _wrong(where, "place", f"a whole number from 1 to {_MOST_PLACES}", place)
+    if isinstance(place, bool) or not isinstance(place, int) or not 1 <= place <= MOST_PLACES:
+        raise _wrong(where, "place", f"a whole number from 1 to {MOST_PLACES}", place)
     return str(region), place
 
 
