@@ -94,6 +94,26 @@ def test_a_motion_file_gives_its_curve_and_start_pose(page_server, tmp_path):
         assert read_curve_file(saved(page, "#save", tmp_path)).pose is not None
 
 
+def test_a_batch_of_imports_can_be_cancelled(page_server, tmp_path):
+    with opened(page_server[0], accept_downloads=True) as page:
+        file = saved(page, "bvh", tmp_path)
+        # another motion each, so that no cache has it
+        text = file.read_text()
+        batch = [tmp_path / f"take_{i}.bvh" for i in range(3)]
+        head, tail = text.split("Frame Time: ")
+        seconds, frames = tail.split("\n", 1)
+        for i, take in enumerate(batch):
+            take.write_text(f"{head}Frame Time: {float(seconds) * (1 + 0.01 * i)}\n{frames}")
+        page.set_input_files("#file-motion", [str(take) for take in batch])
+        page.click("#toast button")
+        says(page, "toast", "take_0.bvh: not imported, nor the 2 after it: cancelled")
+        imported = page.locator("#curve optgroup[label=imported] option")
+        page.set_input_files("#file-motion", str(batch[2]))
+        page.wait_for_function(JUDGED, arg=1)
+        assert imported.count() == 1
+        assert "take_2" in imported.first.inner_text()
+
+
 def test_what_was_imported_is_judged_one_by_one(page_server, tmp_path):
     with opened(page_server[0], accept_downloads=True) as page:
         stands = saved(page, "npz", tmp_path)

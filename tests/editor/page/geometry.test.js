@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { close } from "./samples.js";
 import { cameraAt } from "../../../src/getup_jax/editor/page/camera.js";
 import { contacts, reached } from "../../../src/getup_jax/editor/page/contacts.js";
-import { pinched, Scale, snapped, timeTicks, within, zoomed } from "../../../src/getup_jax/editor/page/graph_scale.js";
+import { around, pinched, Scale, snapped, timeTicks, within, zoomed } from "../../../src/getup_jax/editor/page/graph_scale.js";
 import { lostRuns } from "../../../src/getup_jax/editor/page/panel_motion.js";
 
 test("a scale turns places into times and values, and back", () => {
@@ -20,6 +20,13 @@ test("zooming keeps what is under the pointer and stays inside the motion", () =
   assert.deepEqual(within([0, 99], 6), [0, 6]);
   const [a, b] = within([1, 1.001], 6);
   assert.ok(b - a > 0.19);
+});
+
+test("a panel shows all of the curve, beyond its keys, too", () => {
+  const key = (time, value) => ({ time, value, kind: "auto" });
+  const range = around([key(0, 0), key(0.05, 1.65), key(0.5, 1.7), key(1, 1.5)], { low: 0, high: 1.7 });
+  assert.ok(range[1] > 2, `${range}`); // the curve bends over its second key
+  close(around([key(0, 0.1), key(0.5, 0.2), key(1, 0.1)], { low: 0, high: 1.7 }), [-0.102, 1.802]);
 });
 
 test("what lies between two fingers stays there, however they move", () => {

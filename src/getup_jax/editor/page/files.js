@@ -19,6 +19,9 @@ export class Files {
     store.addEventListener("change", (/** @type {any} */ { detail }) => { if (detail.kind === "project") this.projects += 1; });
     /** @type {string[]} */
     this.refused = []; // why, of the files that are read one after the other
+    this.batch = 0; // a cancelled one's files are not read
+    /** @type {number | null} the import under way */
+    this.number = null;
     $("save").addEventListener("click", () => this.save());
     $("open").addEventListener("click", () => $("file-curve").click());
     $("import").addEventListener("click", () => $("file-motion").click());
@@ -45,10 +48,10 @@ export class Files {
 
   /** One after the other, however many are given and whenever. @param {File[]} files */
   take(files) {
-    const { projects } = this;
+    const { projects, batch } = this;
     this.left += files.length;
     for (const file of files) {
-      const read = this.queue.then(() => this.read(file, projects));
+      const read = this.queue.then(() => (batch === this.batch ? this.read(file, projects) : undefined));
       this.queue = read.catch((error) => { this.refused.push(error.message); }).then(() => this.done());
     }
   }
@@ -56,9 +59,15 @@ export class Files {
   /** What was refused is said when all are read, so that the next file's words do not hide it. */
   done() {
     this.left -= 1;
-    if (this.left || !this.refused.length) return;
-    say(refusals(this.refused), true);
+    if (this.left) return;
+    if (this.refused.length) say(refusals(this.refused), true);
     this.refused = [];
+  }
+
+  /** Ends the import under way, and leaves out the files that wait for it. */
+  cancel() {
+    this.batch += 1;
+    if (this.number !== null) this.link.send({ type: "cancel", of: this.number });
   }
 
   /** @param {File} file @param {number} projects opened when it was chosen */
@@ -73,10 +82,22 @@ export class Files {
       if (projects !== this.projects) throw new Error(`${file.name}: not imported, since another project was opened meanwhile; import it anew.`);
     };
     another();
-    say(`Reading ${file.name} …${this.left > 1 ? ` (${this.left - 1} more)` : ""}`);
-    const answer = await this.link.ask({ type: "import", name }, await file.arrayBuffer());
+    const bytes = await file.arrayBuffer(), { batch } = this;
+    say(`Reading ${file.name} …${this.left > 1 ? ` (${this.left - 1} more)` : ""}`, false, { words: "Cancel", act: () => this.cancel() }, true);
+    const answer = await this.asked(name, bytes).catch((error) => {
+      throw batch === this.batch ? error : new Error(`${file.name}: ${this.left > 1 ? `not imported, nor the ${this.left - 1} after it` : "not imported"}: cancelled`);
+    });
     another();
     return this.to.imported(answer.curves, recordings(answer), file.name);
+  }
+
+  /** The answer to an import, which can be cancelled until it is there. @param {string} name @param {ArrayBuffer} bytes */
+  async asked(name, bytes) {
+    const answer = this.link.ask({ type: "import", name }, bytes);
+    this.number = this.link.number;
+    try {
+      return await answer;
+    } finally { this.number = null; }
   }
 }
 

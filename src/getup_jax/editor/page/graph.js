@@ -3,7 +3,7 @@
 
 import { duration, keysIn } from "./content.js";
 import { KINDS } from "./features.js";
-import { Scale, within } from "./graph_scale.js";
+import { around, Scale, within } from "./graph_scale.js";
 import { Panel } from "./panel.js";
 import { valid } from "./selection.js";
 import { FEATURES } from "./spline.js";
@@ -59,11 +59,9 @@ export class Graph {
   /** @returns {Range} */
   get shownTimes() { return this.times ? within(this.times, this.model.span()) : [0, this.model.span()]; }
 
-  /** Past the usual range only where the keys need it. @param {Feature} feature @returns {Range} */
+  /** Past the usual range only where keys, or the curve between them, need it. @param {Feature} feature @returns {Range} */
   shownValues(feature) {
-    const { low, high } = KINDS[feature], pad = 0.06 * (high - low);
-    const values = keysIn(this.store.now, feature).map((key) => key.value);
-    return this.values[feature] ?? [Math.min(low, ...values) - pad, Math.max(high, ...values) + pad];
+    return this.values[feature] ?? around(keysIn(this.store.now, feature), KINDS[feature]);
   }
 
   /** @param {Feature} feature @param {number} width @param {number} height */

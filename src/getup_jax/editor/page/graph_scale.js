@@ -1,6 +1,7 @@
 // What of time and value a panel shows, and where on the screen.
 
 import { clamp } from "./features.js";
+import { drawn } from "./keys.js";
 
 export const LEFT = 40, RIGHT = 12, TOP = 22, BOTTOM = 20;
 const LEAST_S = 0.2; // the shortest time that can be zoomed into
@@ -27,6 +28,12 @@ export class Scale {
   time(x) { return this.times[0] + ((x - LEFT) / this.across) * (this.times[1] - this.times[0]); }
   /** @param {number} y px */
   value(y) { return this.values[1] - ((y - TOP) / this.down) * (this.values[1] - this.values[0]); }
+}
+
+/** The usual values and all that the curve through the keys takes, which between two of them may be beyond both, with room around. @param {import("./types.js").Key[]} keys @param {{ low: number, high: number }} usual @returns {Range} */
+export function around(keys, { low, high }) {
+  const values = [...keys.map((key) => key.value), ...drawn(keys)], pad = 0.06 * (high - low);
+  return [Math.min(low, ...values) - pad, Math.max(high, ...values) + pad];
 }
 
 /** A range that is `factor` times as long, with `about` in its place. @param {Range} range @param {number} about @param {number} factor @returns {Range} */

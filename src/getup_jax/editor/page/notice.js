@@ -17,8 +17,8 @@ function placed() {
   return toast;
 }
 
-/** @param {string} text @param {boolean} bad @param {{ words: string, act: () => void } | null} button */
-export function say(text, bad = false, button = null) {
+/** @param {string} text @param {boolean} bad @param {{ words: string, act: () => void } | null} button @param {boolean} stays until something else is said */
+export function say(text, bad = false, button = null, stays = false) {
   const line = placed();
   line.replaceChildren(text);
   if (button) {
@@ -30,7 +30,7 @@ export function say(text, bad = false, button = null) {
   }
   line.className = bad ? "shown bad" : "shown";
   clearTimeout(timer);
-  timer = setTimeout(hide, bad || button ? LONG_MS : SHORT_MS);
+  if (!stays) timer = setTimeout(hide, bad || button ? LONG_MS : SHORT_MS);
 }
 
 function hide() { if (toast) toast.className = ""; }
