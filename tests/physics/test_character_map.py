@@ -131,3 +131,20 @@ def test_a_file_that_is_not_there_is_said(tmp_path, mjcf, message):
     text, maps = renamed()
     with pytest.raises(ConfigError, match=message):
         load(written(tmp_path, text, maps, mjcf))
+
+
+def test_the_body_of_composite_motion_gets_up_under_other_names():
+    found, plain = load("humanoid28_getup"), load("humanoid28")
+    order = [name.replace("torso", "spine_upper") for name in plain.joint_names]
+    assert list(found.joint_names) == order
+    assert [n for n in found.link_names if n != "neck"] == [
+        name.replace("torso", "spine_upper") for name in plain.link_names
+    ]
+    np.testing.assert_array_equal(found.neutral_qpos, plain.neutral_qpos)
+    np.testing.assert_array_equal(found.torque_limit, plain.torque_limit)
+    assert found.weight == pytest.approx(plain.weight)
+    data = mujoco.MjData(found.model)
+    data.qpos[:] = np.random.default_rng(0).normal(0.0, 0.3, found.model.nq)
+    mujoco.mj_kinematics(found.model, data)
+    head, neck = (data.body(name).xpos for name in ("head", "neck"))
+    np.testing.assert_allclose(head, neck, atol=1e-4)  # the height of where the head is joined

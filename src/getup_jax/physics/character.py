@@ -122,11 +122,13 @@ def load_character(
 
 
 def character_file(name: str) -> Path:
-    """The MJCF file of a shipped character, or the path itself, also of a map of names."""
+    """The MJCF file or map of names of a shipped character, or the path itself of either."""
     own = name.endswith((".xml", SUFFIX))
     path = Path(name) if own else asset_path(f"{name}.xml")
+    if not own and not path.is_file():
+        path = asset_path(f"{name}{SUFFIX}")
     if not path.is_file():
-        shipped = sorted(p.stem for p in asset_path().glob("*.xml"))
+        shipped = sorted(p.stem for kind in (".xml", SUFFIX) for p in asset_path().glob(f"*{kind}"))
         if not own and Path(name).suffix:
             raise ConfigError(f"physics.character: expected a file .xml or {SUFFIX}, got {name}")
         raise ConfigError(f"physics.character: no file {path}; shipped characters: {shipped}")
