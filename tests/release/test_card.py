@@ -8,7 +8,7 @@ import pytest
 
 from getup_jax.config import ConfigError
 from getup_jax.core.resources import asset_path
-from getup_jax.release.card import weak_curves
+from getup_jax.release.card import gain_line, weak_curves
 from getup_jax.release.export import CARD, export
 from getup_jax.runtime.checkpoint import load_policy
 
@@ -80,3 +80,18 @@ def test_a_curve_that_fails_is_named_once_with_its_worst_evaluation():
     )
     assert many[0].count("%)") == 8
     assert weak_curves([evaluated(a=0.8)]) == []
+
+
+def test_a_card_says_what_is_done_of_edits_and_which_curves_were_trained(tmp_path):
+    found = {
+        "height": {"gain": 0.471, "correlation": 0.37},
+        "side_angle": {"gain": 0.5, "correlation": None},
+    }
+    assert gain_line({"control_gain": found})[-1] == (
+        "Done of what small edits of the curves ask for (correlation): height 0.47 (0.37), "
+        "side angle 0.50 (-)."
+    )
+    assert gain_line({}) == []
+    for name, expected in (("getup", "curves drawn around"), ("flat", "the curves of its styles")):
+        card = (export(asset_path("checkpoints", name), tmp_path / name) / CARD).read_text()
+        assert f"Trained on {expected}" in card

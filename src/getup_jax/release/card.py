@@ -117,7 +117,20 @@ def _numbers(result: Mapping[str, Any]) -> str:
         rows[f"worst curve: {worst}"] = curves[worst]
     head = "| | success | height error m | angle error rad | jitter rad/s³ | energy J | episodes |"
     lines = [_conditions(result["conditions"]), "", head, "|---|---|---|---|---|---|---|"]
-    return "\n".join(lines + [_row(name, row) for name, row in rows.items()])
+    return "\n".join(lines + [_row(name, row) for name, row in rows.items()] + gain_line(result))
+
+
+def gain_line(result: Mapping[str, Any]) -> list[str]:
+    """A line on what is done of small edits of the curves, where that was measured."""
+    found = result.get("control_gain")
+    if not found:
+        return []
+    done = ", ".join(
+        f"{name.replace('_', ' ')} {_number(row['gain'], '.2f')} "
+        f"({_number(row['correlation'], '.2f')})"
+        for name, row in found.items()
+    )
+    return ["", f"Done of what small edits of the curves ask for (correlation): {done}."]
 
 
 def _row(name: str, row: Mapping[str, Any]) -> str:
@@ -154,13 +167,19 @@ def _conditions(of: Mapping[str, Any]) -> str:
 
 
 def _limits(loaded: LoadedPolicy, evaluations: Sequence[Mapping[str, Any]]) -> list[str]:
-    limits = [
+    body = (
         f"Trained for the character `{loaded.config.physics.character}` on the ground and with "
-        "the servos of config.yaml; no other body or machine.",
-        "Follows the curves that it was trained on; others need an evaluation first "
-        "(`getup-eval --blend`).",
-    ]
-    return [*limits, *weak_curves(evaluations)]
+        "the servos of config.yaml; no other body or machine."
+    )
+    drawn = loaded.config.training_aids.drawn_curves > 0
+    known = (
+        "Trained on curves drawn around those of its styles"
+        if drawn
+        else "Trained on the curves of its styles"
+    )
+    tell = "`getup-eval --edits`" if drawn else "`getup-eval --blend`"
+    curves = f"{known}; others need an evaluation first ({tell})."
+    return [body, curves, *weak_curves(evaluations)]
 
 
 def weak_curves(evaluations: Sequence[Mapping[str, Any]]) -> list[str]:
