@@ -2,7 +2,7 @@
 
     import getup_jax as gj
 
-    policy = gj.load_policy("flat")
+    policy = gj.load_policy("getup")
     env = gj.make_env(policy, num_envs=64)
     state = env.reset(seed=0)
     for _ in range(300):
@@ -25,6 +25,7 @@ import jax
 
 from getup_jax.config import Config, ConfigError
 from getup_jax.config.load import load_config as _load_config
+from getup_jax.core.resources import DEFAULT_POLICY
 from getup_jax.core.types import StepOutput
 from getup_jax.envs.composite.goals.combine import GOALS
 from getup_jax.envs.getup.build import build_task
@@ -163,7 +164,7 @@ def load_config(source: str | Path, *overrides: str) -> Config:
     return _load_config(source, overrides)
 
 
-def load_policy(source: str | Path = "flat") -> Policy:
+def load_policy(source: str | Path = DEFAULT_POLICY) -> Policy:
     """The policy of a run folder, a checkpoint, an exported policy, or the name of a shipped one.
 
     Raises CheckpointError that says what is wrong, in one line.

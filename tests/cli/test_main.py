@@ -142,7 +142,7 @@ def test_eval_passes_its_arguments_on(monkeypatch):
     assert cli.eval_main([]) == 0
     options = ["--ckpt", "runs/a", "--episodes", "7", "--seed", "3", "--json", "a.json"]
     assert cli.eval_main([*options, "--video", "a.mp4", "--engine", "mjx"]) == 0
-    default = {"ckpt": "flat", "episodes": None, "seed": 0, "start": "lying"}
+    default = {"ckpt": "getup", "episodes": None, "seed": 0, "start": "lying"}
     default |= {"start_noise": 0.0, "duration_scale": (1.0, 1.0)}
     default |= dict.fromkeys(
         [

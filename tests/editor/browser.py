@@ -55,8 +55,8 @@ def opened(address: str, profile: Path | None = None, **context: Any) -> Iterato
 
     A profile keeps what a browser keeps when it is closed.
     """
-    from playwright.sync_api import sync_playwright
-
+    reason = "needs pip install 'getup-jax[browser]'"
+    sync_playwright = pytest.importorskip("playwright.sync_api", reason=reason).sync_playwright
     problems: list[str] = []
     options = {"viewport": {"width": 1280, "height": 800}, **context}
     with sync_playwright() as play:

@@ -153,6 +153,7 @@ def test_slower_by_mouse_alone(page_server, tmp_path):
 
 def test_a_pause_on_hands_and_knees_by_mouse_alone(page_server, tmp_path):
     with opened(page_server[0], accept_downloads=True) as page, within_a_minute():
+        edited(page, lambda: page.select_option("#curve", label="prone_quadruped_squat"))
         page.click("#play")
         seek(page, 1.2)
         for _ in range(2):

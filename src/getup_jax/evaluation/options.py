@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+from getup_jax.core.resources import DEFAULT_POLICY
 from getup_jax.evaluation.own_ground import GROUND_HELP, own_ground
 
 _EXAMPLES = """\
@@ -104,9 +105,9 @@ def add_checkpoint(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ckpt",
         metavar="PATH",
-        default="flat",
+        default=DEFAULT_POLICY,
         help="a run folder, a checkpoint, the name of a shipped policy, or hf://OWNER/NAME on the "
-        "Hugging Face Hub (default: flat)",
+        f"Hugging Face Hub (default: {DEFAULT_POLICY})",
     )
 
 
