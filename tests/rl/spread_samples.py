@@ -17,7 +17,6 @@ import jax.numpy as jnp
 import numpy as np
 import tiny_composite
 from jax.sharding import PartitionSpec
-from probes import Probe, make_world
 from tiny_task import CONFIG as TINY
 from tiny_task import tiny_task
 
@@ -28,6 +27,7 @@ from getup_jax.physics.character import load_character
 from getup_jax.rl.learner import Learner, make_learner
 from getup_jax.rl.sharded import SPLIT, Placement, place
 from getup_jax.rl.state import TrainState
+from probes import Probe, make_world
 
 NETWORK = NetworkConfig(hidden_sizes=(16,), activation="tanh")
 # one minibatch of all samples, so that the order of the shuffled samples is only that of a sum

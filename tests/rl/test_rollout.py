@@ -5,9 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from probes import Probe, make_world
 
 from getup_jax.rl.rollout import Rollout, masked_mean, rollout, summarize
+from probes import Probe, make_world
 
 T, B = 7, 6
 

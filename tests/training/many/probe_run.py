@@ -12,10 +12,9 @@ from getup_jax.cli.main import train_main
 
 
 def probe_job(config, log):
-    from probes import Probe, make_world
-
     from getup_jax.rl.learner import make_learner
     from getup_jax.training.loop import Job
+    from probes import Probe, make_world
 
     learner = make_learner(Probe(), config.network, config.ppo, config.train.total_steps)
     world = make_world(3, by_sign=1.0, by_action=1.0, action_by_sign=0.5, shows_step=1.0)
