@@ -1,8 +1,9 @@
 """A simulator and trainer that teaches a physics-based humanoid to get up.
 
-`load_policy`, `make_env`, `train`, `evaluate`, `load_config`, `Scenario`, `Policy`, `Env`,
-`register_goal` and `register_reward` are the front door, see docs/python.md; they are imported when
-they are first used, since commands that only answer a wrong option must not wait for JAX.
+`load_policy`, `make_env`, `train`, `evaluate`, `load_config`, `Scenario`, `Policy`, `Env`, `Goal`,
+`GoalOutput`, `register_goal` and `register_reward` are the front door, see docs/python.md; they are
+imported when they are first used, since commands that only answer a wrong option must not wait for
+JAX.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from getup_jax.api import (
         Env,
+        Goal,
+        GoalOutput,
         Policy,
         Scenario,
         evaluate,
@@ -26,6 +29,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 __all__ = [
     "Env",
+    "Goal",
+    "GoalOutput",
     "Policy",
     "Scenario",
     "evaluate",

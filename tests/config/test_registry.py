@@ -72,3 +72,13 @@ def test_a_package_that_cannot_be_imported_is_named(installed):
         "getup_jax.things: theirs of their-package cannot be loaded: ImportError: no module of "
         "theirs; mend or uninstall it"
     )
+
+
+def test_a_package_that_cannot_be_imported_hides_no_other(installed):
+    installed(Point("theirs", ImportError("no module of theirs")), Point("other", 3))
+    things = Registry("getup_jax.things", {})
+    for _ in range(2):
+        with pytest.raises(ConfigError, match="theirs of their-package cannot be loaded"):
+            list(things)
+    installed(Point("other", 3))
+    assert dict(things) == {"other": 3}

@@ -171,6 +171,7 @@ def test_a_journal_writes_means_and_speed(tmp_path):
     [
         ("loss/value", math.nan, True),
         ("ppo/gradient_norm", math.inf, True),
+        ("rollout/reward_mine", math.nan, True),
         ("loss/value", 1e30, False),
         ("episode/success", math.nan, False),
     ],

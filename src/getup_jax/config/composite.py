@@ -112,6 +112,8 @@ class CompositeConfig:
                 for item in value if isinstance(value, list | tuple) else (value,):
                     check(item, float, _OF_GOALS, f"composite.goals.{goal}.{name}")
         require(bool(self.groups), "composite.groups", "at least one group", self.groups)
+        twice = sorted(self.goals.keys() & self.groups.keys())
+        require(not twice, "composite.groups", "names that no goal has", ", ".join(twice))
         kinds = ("all", "own")
         ok = self.meta_sees in kinds
         require(ok, "composite.meta_sees", f"one of {kinds}", self.meta_sees)

@@ -26,15 +26,25 @@ class Registry(Mapping[str, T]):
         self._group, self._found, self._looked = group, dict(own), False
 
     def register(self, name: str, thing: T) -> None:
-        """Add one; ConfigError where the name is taken by another."""
+        """Add one; ConfigError where the name is taken by another.
+
+        The same definition again, as of a notebook's cell that is run twice, takes its own place.
+        """
         known = self._all().get(name, thing)
-        if known is not thing:
-            raise ConfigError(f"{name}: is registered in {self._group} already; choose another")
+        if known is not thing and _definition(known) != _definition(thing):
+            raise ConfigError(
+                f"{name}: is registered in {self._group} already, by {_definition(known)}; choose "
+                "another name"
+            )
         self._found[name] = thing
 
     def choose(self, name: str, key: str) -> T:
         """The one of that name; ConfigError of the setting `key` with the names that there are."""
-        check_name(name, tuple(self), key)
+        try:
+            check_name(name, tuple(self), key)
+        except ConfigError as error:
+            hint = f"your own: an installed package with the entry point {self._group}"
+            raise ConfigError(f"{error}; {hint}, or registered in Python before") from None
         return self[name]
 
     def __getitem__(self, name: str) -> T:
@@ -48,10 +58,20 @@ class Registry(Mapping[str, T]):
 
     def _all(self) -> dict[str, T]:
         if not self._looked:
-            self._looked = True
-            for point in entry_points(group=self._group):
-                self.register(point.name, _loaded(point))
+            self._looked = True  # before: register comes back here
+            try:
+                for point in entry_points(group=self._group):
+                    self.register(point.name, _loaded(point))
+            except ConfigError:
+                self._looked = False  # said again the next time, rather than half of them known
+                raise
         return self._found
+
+
+def _definition(thing: Any) -> str:
+    """Module and name of what was registered; its text where it has none."""
+    module, name = (getattr(thing, word, None) for word in ("__module__", "__qualname__"))
+    return f"{module}.{name}" if module and name else repr(thing)
 
 
 def _loaded(point: Any) -> Any:

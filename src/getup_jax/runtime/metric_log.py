@@ -11,6 +11,8 @@ import numpy as np
 from getup_jax.runtime.console import Display
 from getup_jax.runtime.metric_file import MetricsWriter, NoMetrics
 
+REWARD = "rollout/reward_"  # of every step, so never NaN for want of an episode that ended
+
 
 class MetricLog:
     """Collects the metrics of iterations and logs their means with the speed.
@@ -65,4 +67,5 @@ def means(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 def _diverged(name: str, value: float) -> bool:
     """Whether a metric says that learning broke; NaN is fair where no episode ended."""
-    return ("loss" in name or "gradient_norm" in name) and not math.isfinite(value)
+    watched = name.startswith(REWARD) or "loss" in name or "gradient_norm" in name
+    return watched and not math.isfinite(value)

@@ -18,7 +18,7 @@ from getup_jax.rl.state import owned
 from getup_jax.runtime import checkpoint, processes
 from getup_jax.runtime.console import Display, count, duration
 from getup_jax.runtime.metric_file import MetricsWriter, NoMetrics
-from getup_jax.runtime.metric_log import MetricLog
+from getup_jax.runtime.metric_log import REWARD, MetricLog
 from getup_jax.runtime.pytree_store import CheckpointError, from_nested, is_finite, to_nested
 from getup_jax.runtime.signals import StopRequest
 from getup_jax.training.spread import spread
@@ -26,6 +26,9 @@ from getup_jax.training.spread import spread
 Log = Callable[[str], None]
 CarryOver = Callable[[Any, checkpoint.LoadedPolicy, Log], Any]
 Step = Callable[[Any, Any], tuple[Any, dict[str, jax.Array]]]
+
+_LEARNING_HINT = "try a lower ppo.learning_rate or ppo.max_gradient_norm"
+_REWARD_HINT = f"{_LEARNING_HINT}, or mend the goal or the reward term where it is your own"
 
 
 class TrainingError(ValueError):
@@ -168,7 +171,9 @@ class Loop:
         bad = metric_log.add({name: float(x) for name, x in jax.device_get(metrics).items()})
         if bad:
             metric_log.flush(self.done)
-            raise self._error(f"{', '.join(bad)}: not a finite number")
+            rewards = [name for name in bad if name.startswith(REWARD)]  # losses only follow them
+            hint = _REWARD_HINT if rewards else _LEARNING_HINT
+            raise self._error(f"{', '.join(rewards or bad)}: not a finite number", hint)
 
     def _save_if_possible(self) -> None:
         """Save; a full disk is no reason to lose a run that may find space next time.
@@ -189,7 +194,7 @@ class Loop:
         parts = {"policy": learner.averaged_policy, "critic": learner.valuation}
         item = to_nested({**parts, "prior": self._job.prior})
         if not is_finite(item):
-            raise self._error("a weight of the policy is not a finite number")
+            raise self._error("a weight of the policy is not a finite number", _LEARNING_HINT)
         metadata: dict[str, Any] = {"steps": self.steps}
         if self._job.body is not None:
             metadata[body_digest.KEY] = self._job.body
@@ -197,9 +202,8 @@ class Loop:
             self._checkpoints, self.done, self._state, self._config, item, metadata
         )
 
-    def _error(self, problem: str) -> TrainingError:
+    def _error(self, problem: str, hint: str) -> TrainingError:
         good = f"the last good checkpoint is {self.saved}" if self.saved else "nothing was saved"
-        hint = "try a lower ppo.learning_rate or ppo.max_gradient_norm"
         return TrainingError(f"iteration {self.done}: {problem}; {good}; {hint}")
 
 

@@ -28,6 +28,10 @@ def registered(monkeypatch):
     def one_number(step: RewardInputs) -> jax.Array:
         return jnp.mean(step.phase)
 
+    @gj.register_reward("broken")
+    def broken(step: RewardInputs) -> jax.Array:
+        return step.kinematics["qpos"]  # type: ignore[index]
+
 
 def one_step(built):
     env, rows = built.environment, jnp.arange(4)
@@ -68,6 +72,13 @@ def test_names_are_checked_before_anything_is_built(name, message):
 def test_a_term_of_another_shape_says_so(character):
     built = tiny_task(character, changed(rewards={"one_number": 1.0}))
     with pytest.raises(ConfigError, match=r"one_number: expected .* shape \(4,\), got \(\)"):
+        one_step(built)
+
+
+def test_what_a_term_raises_is_a_line_with_its_place(character):
+    built = tiny_task(character, changed(rewards={"broken": 1.0}))
+    said = r"task\.rewards\.broken: raised TypeError: .* \(test_user_rewards\.py, line \d+\)$"
+    with pytest.raises(ConfigError, match=said):
         one_step(built)
 
 

@@ -80,6 +80,7 @@ def assemble_composite(
     start = start_group(composite)
     starts, following = start_states(composite, character, clips, engine, config.task.pool_size)
     _check_starts(task, starts, f"composite.groups.{start}.clips")
+    goals.check_numbers(starts.physics.kinematics)
     log(f"engine: {engine.name}; {len(starts.history)} start states along {start}'s clips")
     world = CompositeWorld(
         starts=starts, references=references, **_targets(task, clips, config.task)

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from flax import struct
 
 from getup_jax.config import ConfigError
+from getup_jax.config.from_outside import from_outside
 from getup_jax.config.registry import Registry
 from getup_jax.core.types import Kinematics
 from getup_jax.envs.getup.observation import Posture
@@ -41,7 +42,8 @@ def terms(exponents: Mapping[str, float], inputs: RewardInputs) -> dict[str, jax
     """r_i^k_i [B] of every term i, by its name, with its exponent k_i."""
     found = {}
     for name, exponent in exponents.items():
-        value = REWARDS[name](inputs)
+        with from_outside(f"task.rewards.{name}"):
+            value = REWARDS[name](inputs)
         shape = inputs.phase.shape
         if jnp.shape(value) != shape:
             raise ConfigError(

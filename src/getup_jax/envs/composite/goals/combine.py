@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from getup_jax.config import ConfigError
+from getup_jax.config.from_outside import from_outside
 from getup_jax.config.ranges import check_values
 from getup_jax.config.registry import Registry, check_name
 from getup_jax.core.types import Kinematics, PropCommand
@@ -20,11 +21,24 @@ from getup_jax.envs.composite.goals.juggling import Juggling
 from getup_jax.envs.composite.goals.target_heading import TargetHeading
 from getup_jax.envs.composite.goals.target_location import TargetLocation
 from getup_jax.envs.composite.goals.tennis_swing import TennisSwing
+from getup_jax.envs.composite.goals.user_goals import CheckedGoal, check_kind
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.props import Ball, Equipment
 
 _OWN: tuple[Any, ...] = (TargetHeading, TargetLocation, Aiming, TennisSwing, Juggling)
 GOALS: Registry[Any] = Registry("getup_jax.goals", {goal.name: goal for goal in _OWN})
+
+
+def register_goal(goal: type) -> type:
+    """Make a goal known by its `name`; usable as a decorator.
+
+    See docs/goals.md for what a goal is. Commands know it where a package has it as an entry point
+    of the group `getup_jax.goals`. Raises ConfigError where it lacks something, or the name is
+    taken.
+    """
+    check_kind(goal)
+    GOALS.register(goal.name, goal)
+    return goal
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,6 +128,12 @@ class Goals:
             for goal, state in pairs
         )
 
+    def check_numbers(self, kinematics: Kinematics) -> None:
+        """Raise ConfigError where a user's goal says NaN or infinity of these states."""
+        for goal, seen in zip(self.goals, self._seen(kinematics), strict=True):
+            if isinstance(goal, CheckedGoal):
+                goal.check_numbers(seen)
+
     def _seen(self, kinematics: Kinematics) -> list[Kinematics]:
         """What each goal sees: the character, and its own balls alone."""
         seen, first = [], 0
@@ -126,7 +146,7 @@ class Goals:
 
 def equipment_of(names: Collection[str]) -> Equipment:
     """What the character must be loaded with for the goals of a config, before they are made."""
-    kinds = [GOALS.choose(name, "composite.goals") for name in names]
+    kinds = [_kind(name) for name in names]
     balls = tuple(ball for kind in kinds for ball in kind.balls)
     return Equipment(balls=balls, racket=any(getattr(kind, "racket", False) for kind in kinds))
 
@@ -142,21 +162,42 @@ def make_goals(
     return Goals(made)
 
 
+def _kind(name: str) -> Any:
+    """The class of a goal, which is checked where it is a user's."""
+    kind = GOALS.choose(name, "composite.goals")
+    if kind not in _OWN:
+        check_kind(kind, name)
+    return kind
+
+
 def _make(
     name: str, values: Mapping[str, Any] | None, character: CharacterSpec, control_dt: float
-) -> Goal:
+) -> Any:
     key = f"composite.goals.{name}"
-    goal = GOALS.choose(name, "composite.goals")
+    goal = _kind(name)
     fields = {f.name: f for f in dataclasses.fields(goal) if f.default is not dataclasses.MISSING}
     given = {}
     for setting, value in (values or {}).items():
         check_name(setting, tuple(fields), key)
         given[setting] = _rising(value, fields[setting].default, f"{key}.{setting}")
-    check_values(goal, given, key)
-    arguments = {setting: type(fields[setting].default)(v) for setting, v in given.items()}
+    with from_outside(f"{key}: its settings"):
+        check_values(goal, given, key)
+    arguments: dict[str, Any] = given | _asked_for(goal, character, control_dt, key)
+    if goal in _OWN:
+        return goal(**arguments)
+    with from_outside(f"{key}: its settings"):
+        return CheckedGoal(goal(**arguments))
+
+
+def _asked_for(goal: Any, character: CharacterSpec, control_dt: float, key: str) -> dict[str, Any]:
+    """What a goal wants to know beside its settings: indices of links, and the control period."""
     wanted: Mapping[str, str] = getattr(goal, "links", {})
-    links = {field: character.link(link) for field, link in wanted.items()}
-    return goal(control_dt=control_dt, **links, **arguments)
+    for link in wanted.values():
+        check_name(link, character.link_names, f"{key}: links")
+    found: dict[str, Any] = {field: character.link(link) for field, link in wanted.items()}
+    if any(field.name == "control_dt" for field in dataclasses.fields(goal)):
+        found["control_dt"] = control_dt
+    return found
 
 
 def _rising(value: Any, default: Any, key: str) -> Any:

@@ -42,11 +42,15 @@ class Marker:
 
 
 class Goal(Protocol):
-    """One goal task. `settings` of a config are the dataclass' fields with a default."""
+    """One goal task. `settings` of a config are the dataclass' fields with a default.
+
+    A class that derives from it needs `name`, `observation_size`, `reset`, `step` and `observe`;
+    the others are as for a goal without direction, balls, markers and orders.
+    """
 
     name: ClassVar[str]
     observation_size: ClassVar[int]  # G, the size of the goal state g
-    balls: ClassVar[tuple[Ball, ...]]  # that it plays with, in the order of its PropCommand
+    balls: ClassVar[tuple[Ball, ...]] = ()  # it plays with, in the order of its PropCommand
 
     def reset(self, key: jax.Array, kinematics: Kinematics) -> Any:
         """State of B fresh episodes: a pytree of leaves [B, ...]."""
@@ -61,7 +65,7 @@ class Goal(Protocol):
 
         A goal without a direction on the floor stays as it is.
         """
-        ...
+        return state
 
     def observe(self, state: Any, kinematics: Kinematics) -> jax.Array:
         """The goal state g [B, G] of the policy, in the heading frame of the root."""
@@ -69,18 +73,18 @@ class Goal(Protocol):
 
     def command(self, state: Any, kinematics: Kinematics) -> PropCommand | None:
         """Where the balls are put before the next control step; None where it has none."""
-        ...
+        return None
 
     def markers(self, state: Any, kinematics: Kinematics) -> list[Marker]:
         """What to draw for one episode, given rows without the axis B. Host only."""
-        ...
+        return []
 
     def steer(self, state: Any, order: dict[str, Any], age_s: float) -> Any:
         """The state with the target of an order of that age; asked again every control step.
 
         Orders are the numbers that `orders` of a goal names, each with its count and default.
         """
-        ...
+        return state
 
 
 def heading_frame(kinematics: Kinematics, vector: jax.Array) -> jax.Array:
