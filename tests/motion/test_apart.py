@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -14,12 +15,18 @@ import pytest
 from getup_jax.config import PhysicsConfig
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.io.readers import ReadOptions
+from getup_jax.motion.retarget.cache import retarget_files
 from getup_jax.motion.retarget.job import Job
 from getup_jax.motion.retarget.retarget import RetargetSettings
-from getup_jax.motion.retarget.subprocess_job import AbandonedError, Stop, run_apart
+from getup_jax.motion.retarget.subprocess_job import AbandonedError, Stop, Worker, run_apart
 from getup_jax.physics.character import load_character
 
 CHARACTER = load_character(PhysicsConfig())
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("GETUP_JAX_CACHE", str(tmp_path / "cache"))
 
 
 def job(folder, name="walk.bvh", text="x") -> Job:
@@ -75,6 +82,56 @@ def test_a_stop_ends_the_process_and_waits_for_it(tmp_path, monkeypatch):
     with pytest.raises(AbandonedError):
         run_apart(job(tmp_path), stop)
     assert not pid.exists()
+
+
+def test_one_process_takes_one_file_after_the_other(tmp_path, monkeypatch):
+    started: list[list[str]] = []
+    popen = subprocess.Popen
+
+    def counted(command, **options):
+        started.append(command)
+        return popen(command, **options)
+
+    monkeypatch.setattr(subprocess, "Popen", counted)
+    with Worker() as worker:
+        for name in ("one.bvh", "two.bvh"):
+            with pytest.raises(MotionError, match=rf"^{name}, line 1: "):
+                worker.run(job(tmp_path, name))
+    assert len(started) == 1
+
+
+def test_a_worker_that_has_ended_is_started_anew(tmp_path, monkeypatch):
+    stand_in(tmp_path, monkeypatch, f'echo x >> "{tmp_path}/starts"; kill -9 $$')
+    jobs = [job(tmp_path, f"{number}.bvh", str(number)) for number in range(3)]
+    done: list[str] = []
+    results = retarget_files(jobs, 1, lambda path, result: done.append(path.name))
+    for number, result in enumerate(results):
+        assert isinstance(result, MotionError)
+        assert str(result).startswith(f"{number}.bvh: retargeting was ended by SIGKILL")
+    assert (tmp_path / "starts").read_text().count("x") == 3
+    assert done == ["0.bvh", "1.bvh", "2.bvh"]
+
+
+def test_ctrl_c_waits_for_no_file(tmp_path, monkeypatch):
+    pid = tmp_path / "pid"
+    stand_in(tmp_path, monkeypatch, f'echo $$ > "{pid}"; exec sleep 60')
+    jobs = [job(tmp_path, f"{number}.bvh", str(number)) for number in range(3)]
+    done: list[str] = []
+    main = threading.current_thread().ident
+    assert main is not None
+
+    def interrupt() -> None:
+        wait_for(lambda: pid.exists() and pid.read_text())
+        signal.pthread_kill(main, signal.SIGINT)
+
+    begin = time.monotonic()
+    threading.Thread(target=interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        retarget_files(jobs, 1, lambda path, result: done.append(path.name))
+    assert time.monotonic() - begin < 30
+    assert done == []
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(pid.read_text()), 0)
 
 
 def wait_for(condition, seconds: float = 20.0) -> bool:

@@ -6,10 +6,13 @@ import re
 import pytest
 from motion_samples import SUPINE, getup_clip
 
+from getup_jax.cli import motion_files
 from getup_jax.cli.motion import main
+from getup_jax.core.output_file import OutputError
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.io.bvh_writer import write_bvh
 from getup_jax.motion.retarget.body import record
+from getup_jax.motion.retarget.job import run_here
 
 
 @pytest.fixture
@@ -56,9 +59,47 @@ def test_a_bad_file_is_reported_and_the_others_go_on(rise, tmp_path, capsys):
     assert good["frames"] == 48
     said = capsys.readouterr()
     assert "error: bad.bvh" in said.out
-    done = re.findall(r"^(\d)/2 (\w+)\.bvh$", said.err, re.MULTILINE)  # as each is done
+    line = r"^(\d)/2 (\w+)\.bvh(?: failed)?  [\d.]+ s a file, \d+ s left$"  # as each is done
+    done = re.findall(line, said.err, re.MULTILINE)
+    assert "bad.bvh failed" in said.err
     assert [count for count, _ in done] == ["1", "2"]
     assert {name for _, name in done} == {"bad", "rise"}
+
+
+def test_what_is_done_is_kept_when_ctrl_c_comes(rise, tmp_path, monkeypatch, capsys):
+    (rise / "again.bvh").write_text((rise / "rise.bvh").read_text())
+
+    def interrupted(jobs, workers, done):
+        done(jobs[0].path, run_here(jobs[0]))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(motion_files, "retarget_files", interrupted)
+    clips = tmp_path / "clips"
+    with pytest.raises(KeyboardInterrupt):
+        main(["import", str(rise), "--out", str(clips)])
+    assert [file.name for file in clips.iterdir()] == ["again.npz"]
+    assert "1 of 2 files are done; again goes on there" in capsys.readouterr().err
+
+
+def test_a_folder_that_cannot_be_made_is_a_line(rise):
+    with pytest.raises(OutputError, match=r"rise\.bvh: cannot be written: File exists"):
+        main(["import", str(rise), "--out", str(rise / "rise.bvh")])
+
+
+def test_what_is_retargeted_to_another_body_is_shown(tmp_path, monkeypatch, capsys):
+    files = [tmp_path / "a.yaml", tmp_path / "b.yaml"]
+
+    def load(config, character, done):
+        for file in files:
+            done(file)
+        return "library"
+
+    monkeypatch.setattr(motion_files, "load_motions", load)
+    monkeypatch.setattr(motion_files, "to_retarget", lambda config, character: files)
+    for long_s, shown in ((0.0, ["1/2 a.yaml", "2/2 b.yaml"]), (60.0, [])):
+        monkeypatch.setattr(motion_files, "_LONG_S", long_s)
+        assert motion_files.load_library("config", "character") == "library"  # type: ignore[arg-type]
+        assert re.findall(r"^\S+ \S+", capsys.readouterr().err, re.MULTILINE) == shown
 
 
 def test_a_file_that_lacks_one_row_is_used_and_reported(rise, tmp_path, capsys):

@@ -7,6 +7,7 @@ import json
 import time
 from pathlib import Path
 
+from getup_jax.core.output_file import write_text
 from getup_jax.evaluation import bench, bench_report
 from getup_jax.evaluation.bench import Result
 from getup_jax.runtime.console import Display
@@ -35,4 +36,4 @@ def bench_command(args: argparse.Namespace) -> int:
 
 def _write(path: Path, result: Result) -> None:
     text = json.dumps(bench_report.to_json(result), indent=2)
-    path.write_text(text + "\n", encoding="utf-8")
+    write_text(path, text + "\n")

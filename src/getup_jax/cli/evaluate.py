@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from getup_jax.config import ConfigError
+from getup_jax.core.output_file import write_text
 from getup_jax.evaluation import driver, film, plot, steering
 from getup_jax.evaluation.scenario import Scenario
 from getup_jax.evaluation.steering_script import read_script
@@ -79,7 +80,7 @@ def _steer(args: argparse.Namespace, loaded: LoadedPolicy, scenario: Scenario) -
 
 def _write(path: Path | None, facts: dict[str, Any]) -> None:
     if path is not None:
-        path.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+        write_text(path, json.dumps(facts, indent=2) + "\n")
 
 
 def to_scenario(args: argparse.Namespace) -> Scenario:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import functools
 import json
 import math
 import sys
@@ -12,20 +13,17 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from getup_jax.cli.motion_report import FileReport, event_table, file_table, getup_table, report_of
+from getup_jax.cli.motion_files import expanded, load_library, read_files
+from getup_jax.cli.motion_report import FileReport, event_table, file_table, getup_table
 from getup_jax.config import MotionConfig, PhysicsConfig
+from getup_jax.core.output_file import make_folder, replacing, write_text
 from getup_jax.evaluation.options import output
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.io.glb_writer import require_glb
-from getup_jax.motion.io.readers import ReadOptions, is_clip, motion_files
 from getup_jax.motion.io.takes import Take, write_takes
 from getup_jax.motion.io.usd_writer import require_usd
-from getup_jax.motion.library import cpus, load_motions
-from getup_jax.motion.retarget.cache import Job, Result, read_npz, retarget_files, write_npz
-from getup_jax.motion.retarget.joint_names import read_map
-from getup_jax.motion.retarget.retarget import RetargetSettings
+from getup_jax.motion.retarget.cache import Result, write_npz
 from getup_jax.physics.character import CharacterSpec, load_character
 
 _EXAMPLES = """\
@@ -150,27 +148,32 @@ def _rate(text: str) -> float:
 
 
 def _import(args: argparse.Namespace, character: CharacterSpec) -> int:
-    reports = _reports(args, character)
+    files = expanded(args.paths)
+    keep = None
     if args.out:
-        _write_clips(args.out, reports, character)
+        keep = functools.partial(_keep, make_folder(args.out), files, character)
+    reports = read_files(args, files, character, keep)
     console = _wide()
     console.print(file_table(reports))
     _print_messages(console, reports)
     if args.json:
-        args.json.write_text(json.dumps([report.plain() for report in reports], indent=1) + "\n")
+        plain = [report.plain() for report in reports]
+        write_text(args.json, json.dumps(plain, indent=1) + "\n")
     return int(any(report.errors for report in reports))
 
 
-def _write_clips(folder: Path, reports: Sequence[FileReport], character: CharacterSpec) -> None:
-    """One .npz a file; files of one name get their old suffix into the new name."""
-    folder.mkdir(parents=True, exist_ok=True)
-    stems = [report.path.stem for report in reports]
-    for report in reports:
-        if report.clip and report.retarget:
-            twin = stems.count(report.path.stem) > 1
-            name = report.path.name.replace(".", "_") if twin else report.path.stem
-            clip = dataclasses.replace(report.clip, name=name)
-            write_npz(folder / f"{name}.npz", clip, report.retarget, character)
+def _keep(
+    folder: Path, files: Sequence[Path], character: CharacterSpec, path: Path, result: Result
+) -> None:
+    """The clip of a file as an .npz; files of one name get their old suffix into the new name."""
+    if isinstance(result, MotionError):
+        return
+    twin = [file.stem for file in files].count(path.stem) > 1
+    name = path.name.replace(".", "_") if twin else path.stem
+    clip, report = result
+    clip = dataclasses.replace(clip, name=name)
+    with replacing(folder / f"{name}.npz") as part:
+        write_npz(part, clip, report, character)
 
 
 def _wide() -> Console:
@@ -179,7 +182,7 @@ def _wide() -> Console:
 
 
 def _events(args: argparse.Namespace, character: CharacterSpec) -> int:
-    (report,) = _reports(args, character)
+    (report,) = read_files(args, args.paths, character)
     console = _wide()
     if report.clip:
         console.print(event_table(report, report.clip.fps))
@@ -188,7 +191,7 @@ def _events(args: argparse.Namespace, character: CharacterSpec) -> int:
 
 
 def _list(args: argparse.Namespace, character: CharacterSpec) -> int:
-    library = load_motions(MotionConfig(source=tuple(args.sources)), character)
+    library = load_library(MotionConfig(source=tuple(args.sources)), character)
     console = _wide()
     console.print(getup_table(library.getups))
     console.print(f"{len(library.poses)} poses for the pose prior, mirror images included")
@@ -199,7 +202,7 @@ def _plot(args: argparse.Namespace, character: CharacterSpec) -> int:
     from getup_jax.motion.getup.plot import plot_getups, plot_strategies
 
     config = MotionConfig(source=tuple(args.sources), curves=tuple(args.curves))
-    library = load_motions(config, character)
+    library = load_library(config, character)
     if args.strategies:
         plot_strategies(library.getups, character, args.out)
     else:
@@ -212,67 +215,13 @@ def _scene(args: argparse.Namespace, character: CharacterSpec) -> int:
     require = require_glb if args.out.suffix.lower() == ".glb" else require_usd
     require()
     config = MotionConfig(source=tuple(args.sources), curves=tuple(args.curves))
-    clips = [getup.clip for getup in load_motions(config, character).getups if getup.clip]
+    clips = [getup.clip for getup in load_library(config, character).getups if getup.clip]
     takes = [Take(clip.name, clip.fps, clip.qpos) for clip in clips]
     if not takes:
         raise MotionError(f"{', '.join(args.sources)}: expected motions, found curves alone")
     write_takes(args.out, character, takes)
     Console().print(f"{args.out}: {len(takes)} motions", soft_wrap=True)
     return 0
-
-
-def _reports(args: argparse.Namespace, character: CharacterSpec) -> list[FileReport]:
-    files = [file for path in args.paths for file in _expand(path)]
-    console = Console(stderr=True)
-    left = TimeRemainingColumn(elapsed_when_finished=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), left)
-    with Progress(*columns, console=console) as bar:
-        task = bar.add_task("retargeting", total=len(files))
-
-        def done(path: Path) -> None:
-            bar.advance(task)
-            if not console.is_terminal and len(files) > 1:  # a log has no bar
-                count = f"{int(bar.tasks[0].completed)}/{len(files)}"
-                print(f"{count} {path.name}", file=sys.stderr, flush=True)
-
-        results = _retarget(args, files, character, done)
-    return [report_of(file, results[file], character) for file in files]
-
-
-def _retarget(
-    args: argparse.Namespace,
-    files: Sequence[Path],
-    character: CharacterSpec,
-    done: Callable[[Path], None],
-) -> dict[Path, Result]:
-    read = ReadOptions(up=args.up, allow_short=args.allow_short, fps=args.source_fps)
-    settings = RetargetSettings(
-        fps=args.fps,
-        metres=args.scale,
-        floor=args.floor,
-        names=read_map(args.names) if args.names else None,
-    )
-    jobs = [Job(file, character, read, settings) for file in files if not is_clip(file)]
-    results = retarget_files(jobs, cpus(), done)
-    found = dict(zip([job.path for job in jobs], results, strict=True))
-    for file in files:
-        if file not in found:
-            try:
-                found[file] = read_npz(file, character)
-            except MotionError as error:
-                found[file] = error
-            done(file)
-    return found
-
-
-def _expand(path: Path) -> list[Path]:
-    """The motion files that an argument stands for; a missing file is reported later."""
-    if not path.is_dir():
-        return [path]
-    files = motion_files(path)
-    if not files:
-        raise MotionError(f"{path}: no motion files in this folder")
-    return files
 
 
 def _print_messages(console: Console, reports: list[FileReport]) -> None:

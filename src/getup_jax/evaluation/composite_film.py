@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from getup_jax.core.output_file import replacing
 from getup_jax.envs.composite.build import BuiltComposite
 from getup_jax.envs.composite.goals import Marker
 from getup_jax.envs.composite.task import CompositeTask
@@ -66,7 +67,10 @@ def write(
         # starting ffmpeg is a fork and an exec in one, which is safe
         warnings.filterwarnings("ignore", message="os.fork", category=RuntimeWarning)
         rate = round(1.0 / env.engine.control_dt)
-        with imageio.get_writer(path, fps=rate, macro_block_size=8) as writer:
+        with (
+            replacing(path) as part,
+            imageio.get_writer(part, fps=rate, macro_block_size=8) as writer,
+        ):
             for qpos, shown, lines in scenes:
                 images = video.pictures(env.character.model, qpos, size, shown)
                 for image, line in zip(images, lines, strict=True):

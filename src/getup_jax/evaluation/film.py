@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from getup_jax.config import ConfigError
+from getup_jax.core.output_file import replacing
 from getup_jax.envs.composite.goals import Marker
 from getup_jax.envs.composite.goals.drawing import add_markers
 from getup_jax.evaluation.metrics import episode_values
@@ -43,7 +44,10 @@ def film(path: Path, result: Episodes, size: tuple[int, int] = FILM_SIZE) -> Non
         warnings.filterwarnings("ignore", message="os.fork", category=RuntimeWarning)
         begin = time.monotonic()
         display.start(0)
-        with imageio.get_writer(path, fps=fps, macro_block_size=8) as writer:
+        with (
+            replacing(path) as part,
+            imageio.get_writer(part, fps=fps, macro_block_size=8) as writer,
+        ):
             for number, episode in enumerate(chosen, 1):
                 frames = result.trace.qpos[result.trace.running[:, episode], episode]
                 text = f"{number} of {len(chosen)}: {label(result, episode)}"

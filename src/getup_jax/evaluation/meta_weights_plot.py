@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from getup_jax.config import CompositeConfig, ConfigError
+from getup_jax.core.output_file import replacing
 from getup_jax.evaluation.composite_rollout import CompositeEpisodes
 from getup_jax.evaluation.film import render
 from getup_jax.evaluation.plot import require
@@ -71,7 +72,8 @@ def plot_weights(path: Path, character: CharacterSpec, episodes: CompositeEpisod
     if images:
         axes[-1].imshow(np.concatenate(images, axis=1))
         axes[-1].set_title("red: by the meta policy, blue: by itself", fontsize=8)
-    figure.savefig(path, dpi=120)
+    with replacing(path) as part:
+        figure.savefig(part, dpi=120)
     pyplot.close(figure)
 
 

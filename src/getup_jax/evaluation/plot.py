@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from getup_jax.config import ConfigError
+from getup_jax.core.output_file import replacing
 from getup_jax.evaluation.film import render, typical
 from getup_jax.evaluation.rollout import Episodes
 from getup_jax.motion.getup import curves
@@ -45,7 +46,8 @@ def plot(path: Path, result: Episodes) -> None:
     for axis, name in zip(axes[:3, 0], _ROWS, strict=True):
         axis.set_ylabel(name)
     axes[0, 0].legend(fontsize=7, loc="lower right")
-    figure.savefig(path, dpi=110)
+    with replacing(path) as part:
+        figure.savefig(part, dpi=110)
     pyplot.close(figure)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from getup_jax.core.output_file import replacing
 from getup_jax.evaluation import film
 from getup_jax.evaluation.film import Camera, View
 
@@ -22,7 +23,9 @@ def write_turntable(path: Path, model: mujoco.MjModel, qpos: np.ndarray) -> None
     Raises ConfigError where this machine cannot render, or the extra `video` is missing.
     """
     imageio = film.require("--turntable")
-    imageio.imwrite(path, sheet(model, qpos))
+    picture = sheet(model, qpos)
+    with replacing(path) as part:
+        imageio.imwrite(part, picture)
 
 
 def sheet(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from getup_jax.config import MotionConfig
+from getup_jax.motion.authoring.library import carried_files
 from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.getup.getups import cut_getup, find_getups
 from getup_jax.motion.io import curve_file
@@ -43,13 +44,13 @@ def load_motions(
 ) -> MotionLibrary:
     """Read, retarget (or take from the cache) and cut everything in `motion.source`.
 
-    `done` is called after each file. Raises MotionError where a source or a curve is missing.
+    `done` is called after each file of `to_retarget`. Raises MotionError where a source or a curve
+    is missing.
     """
     authored = AUTHORED in config.source
-    getups, poses = _authored(config, character) if authored else ([], [])
-    drawn = [source for source in config.source if Path(source).suffix in curve_file.SUFFIXES]
-    others = [source for source in config.source if source not in (AUTHORED, *drawn)]
-    files = [file for source in others for file in _files(source)]
+    getups, poses = _authored(config, character, done) if authored else ([], [])
+    drawn = _drawn_files(config)
+    files = _motion_files(config)
     clips, report = _clips(files, character, done)
     getups += _getups_of(clips, config.curves, character)
     getups += _drawn(drawn, getups, character)
@@ -62,6 +63,24 @@ def load_motions(
     if config.mirror:
         stacked = np.concatenate([stacked, character.mirror(stacked)])
     return MotionLibrary(tuple(chosen), stacked, report)
+
+
+def to_retarget(config: MotionConfig, character: CharacterSpec) -> list[Path]:
+    """The files of `motion.source` that are not of this character; kept ones are retargeted once.
+
+    Raises MotionError where a source is missing.
+    """
+    others = [file for file in _motion_files(config) if not is_clip(file)]
+    return [*(carried_files(character) if AUTHORED in config.source else ()), *others]
+
+
+def _drawn_files(config: MotionConfig) -> list[str]:
+    return [source for source in config.source if Path(source).suffix in curve_file.SUFFIXES]
+
+
+def _motion_files(config: MotionConfig) -> list[Path]:
+    others = {AUTHORED, *_drawn_files(config)}
+    return [file for source in config.source if source not in others for file in _files(source)]
 
 
 def _drawn(files: Sequence[str], getups: Sequence[GetUp], character: CharacterSpec) -> list[GetUp]:
@@ -111,7 +130,8 @@ def _clips(
     """Every file's clip; short files are taken, as their warning says."""
     read = ReadOptions(allow_short=True)
     jobs = [Job(file, character, read, RetargetSettings()) for file in files if not is_clip(file)]
-    fresh = dict(zip([job.path for job in jobs], retarget_files(jobs, cpus(), done), strict=True))
+    results = retarget_files(jobs, cpus(), lambda path, _: done(path))
+    fresh = dict(zip([job.path for job in jobs], results, strict=True))
     clips, report = [], {}
     for file in files:
         result = fresh[file] if file in fresh else read_npz(file, character)
@@ -130,11 +150,11 @@ def cpus() -> int:
 
 
 def _authored(
-    config: MotionConfig, character: CharacterSpec
+    config: MotionConfig, character: CharacterSpec, done: Callable[[Path], None]
 ) -> tuple[list[GetUp], list[np.ndarray]]:
     from getup_jax.motion.authoring.keyframes import authored_poses, load_authored
 
-    getups = load_authored(character)
+    getups = load_authored(character, done)
     noise, count = config.augment_noise_rad, config.augment_poses
     return getups, [authored_poses(getups, character, count, noise, _SEED)]
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from getup_jax import __version__
 from getup_jax.config import ConfigError
+from getup_jax.core.output_file import write_bytes, write_text
 from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.build import make_task
 from getup_jax.evaluation.getup import evaluation_config, restore_policy
@@ -57,9 +58,9 @@ def export_onnx(source: str | Path, file: Path) -> list[Path]:
             entry = model.metadata_props.add()
             entry.key, entry.value = METADATA, json.dumps(metadata(loaded, parts))
         files.append(file if name == "policy" else file.with_name(f"{file.stem}_{name}.onnx"))
-        files[-1].write_bytes(model.SerializeToString())
+        write_bytes(files[-1], model.SerializeToString())
     files.append(file.with_suffix(".xml"))
-    files[-1].write_text(character_xml(loaded.config.physics), encoding="utf-8")
+    write_text(files[-1], character_xml(loaded.config.physics))
     return files
 
 

@@ -77,7 +77,7 @@ def test_a_term_of_another_shape_says_so(character):
 
 def test_what_a_term_raises_is_a_line_with_its_place(character):
     built = tiny_task(character, changed(rewards={"broken": 1.0}))
-    said = r"task\.rewards\.broken: raised TypeError: .* \(test_user_rewards\.py, line \d+\)$"
+    said = r"task\.rewards\.broken: raised TypeError: .* \(test_user_rewards\.py, line \d+\)"
     with pytest.raises(ConfigError, match=said):
         one_step(built)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,29 +24,44 @@ _FIT_SAMPLES = 256  # of every curve
 _loaded: dict[tuple[str, ...], tuple[GetUp, ...]] = {}  # by the body
 
 
-def load_authored(character: CharacterSpec) -> list[GetUp]:
+def load_authored(
+    character: CharacterSpec, done: Callable[[Path], None] = lambda path: None
+) -> list[GetUp]:
     """Every shipped get-up: the reference motions in order of name, then the drawn styles.
 
     A reference motion is called as its file; a drawn style NAME of 2.5 s is NAME@2.5. What a
     process has loaded for a body of these shapes and joints it keeps; the arrays are read-only.
     The keyframes' angles are those of the default body: on one with other hinges its motions are
-    retargeted, and on one of another size the drawn heights are scaled.
+    retargeted, and on one of another size the drawn heights are scaled. `done` is called after each
+    file that is retargeted.
     """
     body = body_digest(character.model)
     key = tuple(body[part] for part in ("lengths", "masses", "shapes", "joints"))
     if key not in _loaded:
-        _loaded[key] = tuple(_load(character))
+        _loaded[key] = tuple(_load(character, done))
     return list(_loaded[key])
 
 
-def _load(character: CharacterSpec) -> list[GetUp]:
-    files = sorted(asset_path("motions").glob("*.yaml"))
+def carried_files(character: CharacterSpec) -> list[Path]:
+    """The shipped motions that are retargeted to this character; none where angles fit."""
+    return [] if takes_angles(character, load_character(PhysicsConfig())) else _files()
+
+
+def _files() -> list[Path]:
+    return sorted(asset_path("motions").glob("*.yaml"))
+
+
+def _load(character: CharacterSpec, done: Callable[[Path], None]) -> list[GetUp]:
+    files = _files()
     written_for = load_character(PhysicsConfig())
     reads = character if takes_angles(character, written_for) else written_for
     motions = [read_keyframes(path, reads) for path in files]
     clips = [clip_from_keyframes(motion, reads) for motion in motions]
     if reads is not character:
-        clips = [carried_over(clip, reads, character) for clip in clips]
+        clips = [
+            _told(carried_over(clip, reads, character), file, done)
+            for clip, file in zip(clips, files, strict=True)
+        ]
     references = [
         GetUp(clip.name, clip.duration, points, clip, motion.strategy, error)
         for motion, clip in zip(motions, clips, strict=True)
@@ -61,6 +76,11 @@ def _load(character: CharacterSpec) -> list[GetUp]:
         if getup.clip is not None:
             getup.clip.qpos.setflags(write=False)
     return found
+
+
+def _told(clip: Clip, file: Path, done: Callable[[Path], None]) -> Clip:
+    done(file)
+    return clip
 
 
 def read_drawn(path: str | Path, references: Sequence[str]) -> list[GetUp]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from getup_jax.core.output_file import replacing
 from getup_jax.motion.clips import GetUp, MotionError
 from getup_jax.motion.getup import curves
 from getup_jax.motion.getup.events import link_positions
@@ -39,7 +40,8 @@ def plot_getups(getups: Sequence[GetUp], character: CharacterSpec, file: Path) -
         axis.set_title(label)
     figure.tight_layout()
     file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=90)
+    with replacing(file) as part:
+        figure.savefig(part, dpi=90)
     pyplot.close(figure)
 
 
@@ -65,7 +67,8 @@ def plot_strategies(getups: Sequence[GetUp], character: CharacterSpec, file: Pat
         axis.set_xlabel("phase t / T")
     figure.tight_layout()
     file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, dpi=80)
+    with replacing(file) as part:
+        figure.savefig(part, dpi=80)
     pyplot.close(figure)
 
 

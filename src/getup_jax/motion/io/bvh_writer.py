@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from getup_jax.core.output_file import write_text
 from getup_jax.motion.io.bvh import Y_UP
 from getup_jax.motion.io.recording import Recording, scaled, turned
 
@@ -29,7 +30,7 @@ def write_bvh(recording: Recording, path: str | Path) -> None:
     lines = ["HIERARCHY", *_joint_lines(file, 0, 0, moving, order)]
     lines += ["MOTION", f"Frames: {file.num_frames}", f"Frame Time: {1 / file.fps:.8f}"]
     lines += _rows(file, moving, order)
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def _joint_lines(

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from getup_jax.core.output_file import write_bytes
 from getup_jax.motion.io.geom_meshes import link_meshes
 from getup_jax.motion.io.takes import Take, local_poses
 from getup_jax.physics.character import CharacterSpec
@@ -30,7 +31,7 @@ def require_glb() -> Any:
 
 def write_glb(path: str | Path, character: CharacterSpec, takes: Sequence[Take]) -> None:
     """Write the character, and every take as an animation; see `glb_bytes`."""
-    Path(path).write_bytes(glb_bytes(character, takes))
+    write_bytes(path, glb_bytes(character, takes))
 
 
 def glb_bytes(character: CharacterSpec, takes: Sequence[Take]) -> bytes:

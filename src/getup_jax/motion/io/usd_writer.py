@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from getup_jax.core.output_file import replacing
 from getup_jax.motion.io.geom_meshes import Part, link_meshes
 from getup_jax.motion.io.takes import Take, local_poses
 from getup_jax.physics.character import CharacterSpec
@@ -59,7 +60,8 @@ def write_usd(path: str | Path, character: CharacterSpec, takes: Sequence[Take])
         stage.SetStartTimeCode(0.0)
         layer = stage.GetRootLayer()
         layer.customLayerData = {"takes": ranges}
-    stage.GetRootLayer().Export(str(path))
+    with replacing(path) as part:
+        stage.GetRootLayer().Export(str(part))
 
 
 def _links(stage: Any, character: CharacterSpec) -> list[tuple[Any, Any]]:

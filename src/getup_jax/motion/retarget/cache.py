@@ -10,6 +10,7 @@ import contextlib
 import dataclasses
 import hashlib
 import json
+import threading
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,7 +25,7 @@ from getup_jax.motion.io.text import read_bytes
 from getup_jax.motion.retarget.job import Job, Result, run_here
 from getup_jax.motion.retarget.joint_names import listed
 from getup_jax.motion.retarget.retarget import RetargetReport
-from getup_jax.motion.retarget.subprocess_job import run_apart
+from getup_jax.motion.retarget.subprocess_job import Stop, Worker
 from getup_jax.physics.character import CharacterSpec
 
 # Code whose change makes other clips out of the same files.
@@ -45,27 +46,41 @@ _SHAPE = (
 )
 
 Run = Callable[[Job], tuple[Clip, RetargetReport]]
+Done = Callable[[Path, Result], None]
 
 
 def retarget_files(
-    jobs: Sequence[Job], workers: int, done: Callable[[Path], None] = lambda path: None
+    jobs: Sequence[Job], workers: int, done: Done = lambda path, result: None
 ) -> list[Result]:
     """One result a job, in order; a file that fails gives its error and stops no other.
 
-    Several are retargeted side by side, each in a process of its own.
+    Several are retargeted side by side, in processes that each take one file after the other.
+    `done` is called as each is finished, from the thread that it was finished in.
     """
-    run = run_here if len(jobs) == 1 else run_apart
+    if len(jobs) == 1:
+        return [_finished(jobs[0], run_here, done)]
+    own, stop = threading.local(), Stop()  # own.worker: of each thread
 
-    def one(job: Job) -> Result:
+    def run(job: Job) -> tuple[Clip, RetargetReport]:
+        if not hasattr(own, "worker"):
+            own.worker = running.enter_context(Worker(stop))
+        return own.worker.run(job)
+
+    with contextlib.ExitStack() as running, ThreadPoolExecutor(max(1, workers)) as pool:
         try:
-            result: Result = kept(job, run)
-        except MotionError as error:
-            result = error
-        done(job.path)
-        return result
+            return list(pool.map(lambda job: _finished(job, run, done), jobs))
+        except BaseException:  # Ctrl-C, too: nobody waits for what is still being retargeted
+            stop.set()
+            raise
 
-    with ThreadPoolExecutor(max(1, workers)) as pool:
-        return list(pool.map(one, jobs))
+
+def _finished(job: Job, run: Run, done: Done) -> Result:
+    try:
+        result: Result = kept(job, run)
+    except MotionError as error:
+        result = error
+    done(job.path, result)
+    return result
 
 
 def kept(job: Job, run: Run) -> tuple[Clip, RetargetReport]:

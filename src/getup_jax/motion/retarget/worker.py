@@ -1,4 +1,4 @@
-"""`python -P -m getup_jax.motion.retarget.worker [BYTES]`: a pickled Job in, its result out.
+"""`python -P -m getup_jax.motion.retarget.worker [BYTES]`: pickled Jobs in, their results out.
 
 BYTES is the memory that it may use. It ends where the process that started it has ended.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pickle
+import signal
 import sys
 import threading
 import time
@@ -23,19 +24,27 @@ _LOOK_S = 0.5  # how often it looks for the process that started it
 
 
 def main() -> None:
-    """Serve the one job on stdin."""
+    """Serve the jobs on stdin, until it ends."""
     end_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for the one who started it
     if len(sys.argv) > 1:
         limit_memory(int(sys.argv[1]))
     output = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     sys.stdout = sys.stderr  # whatever prints must not break the answer
-    job: Job = pickle.load(sys.stdin.buffer)
+    while (job := _next()) is not None:
+        try:
+            result: Result = run_here(job)
+        except MotionError as error:
+            result = error
+        pickle.dump(result, output)
+        output.flush()
+
+
+def _next() -> Job | None:
     try:
-        result: Result = run_here(job)
-    except MotionError as error:
-        result = error
-    pickle.dump(result, output)
-    output.close()
+        return pickle.load(sys.stdin.buffer)
+    except EOFError:
+        return None
 
 
 def end_with_parent() -> None:
