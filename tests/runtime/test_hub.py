@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+import types
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from getup_jax.runtime import checkpoint, hub
 from getup_jax.runtime.pytree_store import CheckpointError
 
 library = pytest.importorskip("huggingface_hub")
+errors = pytest.importorskip("huggingface_hub.errors")
 constants = pytest.importorskip("huggingface_hub.constants")
 COMMIT = "0" * 40
 
@@ -58,6 +60,52 @@ def test_what_is_not_there_is_one_line(server):
     with pytest.raises(CheckpointError, match="hf://no/body: could not be fetched") as raised:
         checkpoint.load_policy("hf://no/body")
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "status", "text"),
+    [
+        ("RepositoryNotFoundError", 401, "no such repository, or a private one: check the name"),
+        ("HfHubHTTPError", 403, "no such repository, or a private one: check the name"),
+        ("RevisionNotFoundError", 404, "there is no such branch, tag or commit"),
+        ("HfHubHTTPError", 500, "try again later"),
+        ("LocalEntryNotFoundError", None, "check the network"),
+    ],
+)
+def test_a_failed_download_says_what_to_do(server, monkeypatch, kind, status, text):
+    class Error(getattr(errors, kind)):
+        """As the library raises it, without a server."""
+
+        def __init__(self) -> None:
+            self.response = None if status is None else types.SimpleNamespace(status_code=status)
+
+        def __str__(self) -> str:
+            return f"{status} Client Error. \n\nmore lines"
+
+    def refuse(*_, **__):
+        raise Error
+
+    monkeypatch.setattr(library, "snapshot_download", refuse)
+    with pytest.raises(CheckpointError, match=rf"hf://no/body: .* Client Error; {text}") as raised:
+        checkpoint.load_policy("hf://no/body")
+    assert "\n" not in str(raised.value)
+
+
+def test_without_a_network_it_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(constants, "HF_HUB_CACHE", str(tmp_path))
+    monkeypatch.setattr(constants, "ENDPOINT", "http://127.0.0.1:9")  # where nobody answers
+    with pytest.raises(CheckpointError, match=r"could not be fetched: .*; check the network"):
+        checkpoint.load_policy("hf://no/body")
+
+
+def test_a_repository_without_a_policy_is_a_line(server):
+    folder = server / "models--some--body"
+    (folder / "snapshots" / COMMIT).mkdir(parents=True)
+    (folder / "snapshots" / COMMIT / "README.md").write_text("nothing else")
+    (folder / "refs").mkdir()
+    (folder / "refs/main").write_text(COMMIT)
+    with pytest.raises(CheckpointError, match="hf://some/body: holds no checkpoint; expected"):
+        checkpoint.load_policy("hf://some/body")
 
 
 def test_a_failed_upload_is_one_line(server, monkeypatch, tmp_path):

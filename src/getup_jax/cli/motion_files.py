@@ -135,4 +135,5 @@ class _Progress:
 
     def say(self, text: str) -> None:
         """A line above the bar."""
-        print(text, file=sys.stderr, flush=True)
+        sys.stderr.write(f"{text}\n")  # in one piece, since threads say things
+        sys.stderr.flush()

@@ -30,7 +30,8 @@ def download(address: str) -> Path:
     try:
         folder = hub.snapshot_download(repo, revision=revision, allow_patterns=_FILES)
     except Exception as error:  # of the network, the server, the account or the disk
-        raise CheckpointError(f"{address}: could not be fetched: {_first_line(error)}") from None
+        text = f"{_first_line(error).rstrip('. ')}; {_what_to_do(error)}"
+        raise CheckpointError(f"{address}: could not be fetched: {text}") from None
     return Path(folder)
 
 
@@ -63,6 +64,22 @@ def _parts(address: str) -> tuple[str, str | None]:
 
 def _hub(address: str) -> Any:
     return load_extra("huggingface_hub", "hub", address)
+
+
+def _what_to_do(error: Exception) -> str:
+    """The library's first line often has a status alone, and the Hub hides what is private."""
+    from huggingface_hub import errors  # pyright: ignore[reportMissingImports]
+
+    status = getattr(getattr(error, "response", None), "status_code", None)
+    if isinstance(error, errors.RevisionNotFoundError):
+        return "there is no such branch, tag or commit"
+    if isinstance(error, errors.RepositoryNotFoundError) or status in (401, 403, 404):
+        return (
+            "no such repository, or a private one: check the name, or log in with `hf auth login`"
+        )
+    if status is None:  # no answer at all
+        return "check the network; what was fetched before stays in the Hub's cache"
+    return "try again later"
 
 
 def _first_line(error: Exception) -> str:
