@@ -99,11 +99,11 @@ def test_without_a_network_it_says_so(tmp_path, monkeypatch):
 
 
 def test_a_repository_without_a_policy_is_a_line(server):
-    folder = server / "models--some--body"
-    (folder / "snapshots" / COMMIT).mkdir(parents=True)
-    (folder / "snapshots" / COMMIT / "README.md").write_text("nothing else")
+    folder, commit = server / "models--some--body", "a" * 40
+    (folder / "snapshots" / commit).mkdir(parents=True)
+    (folder / "snapshots" / commit / "README.md").write_text("nothing else")
     (folder / "refs").mkdir()
-    (folder / "refs/main").write_text(COMMIT)
+    (folder / "refs/main").write_text(commit)
     with pytest.raises(CheckpointError, match="hf://some/body: holds no checkpoint; expected"):
         checkpoint.load_policy("hf://some/body")
 

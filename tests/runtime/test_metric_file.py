@@ -137,6 +137,27 @@ def test_the_library_writes_an_event_file(tmp_path):
     assert b"some_reward" in file.read_bytes()
 
 
+def test_tensorboards_own_reader_finds_what_the_lines_say(tmp_path):
+    """Also of a resumed run: what was written past its checkpoint is hidden."""
+    pytest.importorskip("tensorboardX")
+    name = "tensorboard.backend.event_processing.event_accumulator"
+    reader = pytest.importorskip(name)
+    with MetricsWriter(tmp_path, tensorboard=True) as writer:
+        for number in (1, 2, 3):
+            writer.write(number, 16 * number, 0.5, {"rollout/reward": 0.1 * number})
+    (first,) = (tmp_path / "tensorboard").iterdir()
+    first.rename(first.with_name(first.name.replace("tfevents.", "tfevents.0")))  # long ago
+    with MetricsWriter(tmp_path, 1, tensorboard=True) as writer:
+        writer.write(2, 32, 1.0, {"rollout/reward": 0.7, "episode/success": math.nan})
+    found = reader.EventAccumulator(str(tmp_path / "tensorboard"))
+    found.Reload()
+    assert found.Tags()["scalars"] == ["rollout/reward"]
+    points = [(event.step, event.value) for event in found.Scalars("rollout/reward")]
+    lines = [(row["steps"], row["rollout/reward"]) for row in read_metrics(tmp_path)]
+    assert [step for step, _ in points] == [step for step, _ in lines] == [16, 32]
+    assert [x for _, x in points] == pytest.approx([x for _, x in lines])
+
+
 def test_tensorboard_that_is_not_installed_says_how_to_install_it(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "tensorboardX", None)
     with pytest.raises(ConfigError, match=r"pip install 'getup-jax\[tensorboard\]'"):
