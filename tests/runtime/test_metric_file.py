@@ -8,9 +8,10 @@ import types
 
 import pytest
 from rich.console import Console
+from rich.table import Table
 
 from getup_jax.config import ConfigError
-from getup_jax.runtime.console import Display, count, describe, duration
+from getup_jax.runtime.console import Display, as_text, count, describe, duration
 from getup_jax.runtime.metric_file import FILE, TIMES, MetricsError, MetricsWriter, read_metrics
 from getup_jax.runtime.metric_log import MetricLog, means
 
@@ -251,6 +252,19 @@ def test_plain_lines_where_there_is_no_terminal():
         update,
         "done",
     ]
+
+
+def test_in_a_notebook_tables_are_text_and_messages_are_lines(monkeypatch, capsys):
+    shown: list[object] = []
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
+    monkeypatch.setattr("rich.jupyter.display", lambda *given: shown.append(given))
+    table = Table("style")
+    table.add_row("prone")
+    assert "prone" in as_text(table, width=40)
+    with Display(1) as display:
+        display.log("a message")
+    assert capsys.readouterr().out == "a message\n"
+    assert shown == []
 
 
 def test_a_bar_on_a_terminal():

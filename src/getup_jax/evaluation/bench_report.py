@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import math
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from getup_jax import __version__
 from getup_jax.evaluation.bench import VERSION, Cell, Result, suites
 from getup_jax.evaluation.verdicts import RULES
+from getup_jax.runtime.console import as_text
 
 _HEADINGS = {"ours": "ours", "sca2022": "SCA 2022", "thesis": "thesis", "host": "HoST"}
 
@@ -26,11 +25,8 @@ def table(result: Result) -> str:
             view.add_row(cell.suite, cell.ground, f"{cell.push_ns:g}", *_figures(cell))
         view.add_section()
     view.add_row("all", "", "", *_figures(result.total()))
-    out = io.StringIO()
-    Console(file=out, width=120).print(view)
-    if result.missing:
-        out.write(f"not run: {', '.join(result.missing)}\n")
-    return out.getvalue()
+    missing = f"not run: {', '.join(result.missing)}\n" if result.missing else ""
+    return as_text(view, width=120) + missing
 
 
 def _figures(cell: Cell) -> list[str]:

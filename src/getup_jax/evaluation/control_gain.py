@@ -14,13 +14,11 @@ both are also given at the lag at which the correlation is highest.
 from __future__ import annotations
 
 import dataclasses
-import io
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from getup_jax.envs.getup.build import BuiltTask
@@ -29,6 +27,7 @@ from getup_jax.evaluation.rollout import Progress, run_episodes
 from getup_jax.evaluation.scenario import Plan
 from getup_jax.motion.getup.curves import NAMES
 from getup_jax.rl.learner import Learner
+from getup_jax.runtime.console import as_text
 
 # Standard deviation of a control point's move (m, rad, rad), each of its own. The curves between
 # them move by .05 m, 6 and 7 degrees (rms): a spline is a mean of points, and the ends stay.
@@ -219,9 +218,7 @@ def table(found: Mapping[str, ControlGain]) -> str:
                 f"{scale * row.done_rms:.3g} {unit}",
                 "-" if math.isnan(result.success) else f"{result.success:.0%}",
             )
-    out = io.StringIO()
-    Console(file=out, width=200).print(view)
-    return out.getvalue()
+    return as_text(view, width=200)
 
 
 def to_json(found: ControlGain) -> dict[str, Any]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Mapping
 
-from rich.console import Console
 from rich.table import Table
 
 from getup_jax.evaluation.metrics import Scores
+from getup_jax.runtime.console import as_text
 
 # (score, heading, format); those without a format are made in `_cell`
 _SUCCESS = (
@@ -42,11 +41,7 @@ def table(scores: Scores) -> str:
     success = _SUCCESS
     if math.isnan(scores.success_pushed):
         success = tuple(column for column in _SUCCESS if column[0] != "success_pushed")
-    out = io.StringIO()
-    console = Console(file=out, width=200)
-    console.print(_view(scores, success))
-    console.print(_view(scores, _NATURALNESS))
-    return out.getvalue()
+    return as_text(_view(scores, success), _view(scores, _NATURALNESS), width=200)
 
 
 def _view(scores: Scores, columns: _Columns) -> Table:

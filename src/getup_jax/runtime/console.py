@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import math
 import os
 import sys
 from collections.abc import Mapping
 from typing import IO, Any
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Column
 
@@ -35,7 +36,10 @@ class Display:
         self._total, self._unit = total, unit
         self._quiet = quiet
         output: Any = _Output(sys.stdout)
-        self._console = console or Console(file=output, highlight=False, soft_wrap=True)
+        # a notebook gets plain lines: rich would show each as a picture of its own
+        self._console = console or Console(
+            file=output, highlight=False, soft_wrap=True, force_jupyter=False
+        )
         self._bar: Progress | None = None
 
     def log(self, message: str) -> None:
@@ -106,6 +110,15 @@ class _Output:
             # to nowhere from here on, also what Python still has to flush when it ends
             with contextlib.suppress(OSError), open(os.devnull, "w") as nowhere:
                 os.dup2(nowhere.fileno(), self._stream.fileno())
+
+
+def as_text(*views: RenderableType, width: int) -> str:
+    """Tables of rich as text, also in a notebook, where a console shows them instead."""
+    out = io.StringIO()
+    console = Console(file=out, width=width, force_jupyter=False)
+    for view in views:
+        console.print(view)
+    return out.getvalue()
 
 
 def describe(
