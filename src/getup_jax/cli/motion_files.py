@@ -111,7 +111,7 @@ class _Progress:
             TextColumn("{task.description}"),
             console=self._console,
             transient=begin_s > 0,
-            disable=total < 1,
+            disable=total < 1 or (begin_s > 0 and not self._console.is_terminal),
         )
         self._task = self._bar.add_task("", total=total)
 

@@ -7,7 +7,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from probes import Probe
 from tiny_composite import CONFIG, tiny_composite
 
 from getup_jax.api import Env
@@ -18,6 +17,7 @@ from getup_jax.rl.actor_critic import META_LOGIT, make_actor_critic, normalized,
 from getup_jax.rl.learner import make_learner
 from getup_jax.runtime.checkpoint import save_learner
 from getup_jax.training import run
+from probes import Probe
 
 STATE = {"none": np.zeros(1)}  # of a training that these tests do not go on with
 
