@@ -36,7 +36,7 @@ class GroupScore:
 class GoalScore:
     """How a goal is reached."""
 
-    reward: float  # mean over all steps
+    reward: float  # mean over all steps, 0 from a fall on
     success: float | None  # share of the attempts, mean over episodes; None: there were none
 
 
@@ -67,6 +67,15 @@ def episode_count(scenario: Scenario) -> int:
     return scenario.episodes or EPISODES
 
 
+def goal_reward(reward: np.ndarray, fell: np.ndarray) -> float:
+    """Mean of a goal's rewards [N, T] over all steps, 0 from a fall [N, T] on.
+
+    What a step pays that ends a training episode, `composite.end_reward`, is not the goal's.
+    """
+    alive = ~np.logical_or.accumulate(fell, axis=1)
+    return float(np.where(alive, reward, 0.0).mean())
+
+
 def score_composite(task: BuiltComposite, episodes: CompositeEpisodes) -> CompositeScores:
     """The imitation of every group, what became of the goals, and the share of falls.
 
@@ -86,7 +95,7 @@ def score_composite(task: BuiltComposite, episodes: CompositeEpisodes) -> Compos
         share = episodes.goal_success[:, index]
         known = share[np.isfinite(share)]
         goals[name] = GoalScore(
-            reward=float(episodes.goal_reward[:, :, index].mean()),
+            reward=goal_reward(episodes.goal_reward[:, :, index], episodes.fell),
             success=float(known.mean()) if known.size else None,
         )
     return CompositeScores(
