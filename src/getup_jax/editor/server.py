@@ -35,9 +35,8 @@ from getup_jax.runtime import checkpoint
 from getup_jax.runtime.checkpoint import LoadedPolicy
 
 _MAX_BYTES = messages.MAX_FILE_BYTES + messages.MAX_TEXT_BYTES
-_MAX_PAGES = 16
 
-Build = Callable[[Callable[[str], None]], tuple[Session, dict[str, Any]]]
+Build = Callable[[Callable[[str], None]], tuple[Any, dict[str, Any]]]
 
 
 class EditorError(ValueError):
@@ -51,25 +50,30 @@ def edit_command(args: argparse.Namespace) -> int:
     warnings.filterwarnings("ignore", message="os.fork", category=RuntimeWarning)
     keep_compiled()
     loaded = checkpoint.load_policy(args.ckpt)
-    _check_task(loaded)
-
-    def build(log: Callable[[str], None]) -> tuple[Session, dict[str, Any]]:
-        return build_session(loaded, log)
-
-    app = App(build, Site.of(args.token))
+    app = _steering(loaded, args) if loaded.config.composite_motion else _editing(loaded, args)
     with contextlib.suppress(KeyboardInterrupt):
         asyncio.run(app.run(args.host, args.port))
     return 0
 
 
-def _check_task(loaded: LoadedPolicy) -> None:
-    """Raise EditorError where the policy follows no curves."""
-    if loaded.config.composite_motion:
-        raise EditorError(
-            f"{loaded.path}: a policy of composite motion, which follows reference motions and "
-            "goals, not the curves of a get-up; watch it with getup-eval --ckpt ... --video "
-            "FILE.mp4, and open a policy that gets up here, as getup-edit --ckpt flat does"
-        )
+def _editing(loaded: LoadedPolicy, args: argparse.Namespace) -> App:
+    """The page that draws the curves of a policy that gets up."""
+    for option, given in (("--with", args.others), ("--getup", args.getup)):
+        if given:
+            raise EditorError(
+                f"{option}: is for policies of composite motion, which are steered; {args.ckpt} "
+                "gets up, and its curves are drawn; leave it out, or steer, as getup-edit --ckpt "
+                "walk does"
+            )
+    return App(lambda log: build_session(loaded, log), Site.of(args.token))
+
+
+def _steering(loaded: LoadedPolicy, args: argparse.Namespace) -> App:
+    """The page in which policies of composite motion are steered."""
+    # imported here, since pages of get-up policies do without
+    from getup_jax.editor.steer.app import steering
+
+    return steering(args.ckpt, loaded, args.others, args.getup, args.token)
 
 
 def build_session(
@@ -89,11 +93,13 @@ def build_session(
 class App:
     """All pages and the session that they share."""
 
+    most_pages = 16
+
     def __init__(self, build: Build, site: Site) -> None:
         self._build, self._site = build, site
         self._pages = itertools.count()
         self._boxes: dict[int, Outbox] = {}
-        self._session: Session | None = None
+        self._session: Any = None  # once it is built; see `Build`
         self._hello = _status("starting", "loading")
         self._work = Work()
 
@@ -166,8 +172,8 @@ class App:
 
     async def _page(self, connection: ServerConnection) -> None:
         """One page from its first message to its last."""
-        if len(self._boxes) >= _MAX_PAGES:
-            await connection.close(1013, f"at most {_MAX_PAGES} pages at once")
+        if len(self._boxes) >= self.most_pages:
+            await connection.close(1013, f"at most {self.most_pages} pages at once")
             return
         page, box = next(self._pages), Outbox(connection)
         self._boxes[page] = box
@@ -189,17 +195,24 @@ class App:
         """Pass a request on; what is wrong with it is said, and nothing else happens."""
         request = None
         try:
-            request = messages.read(message)
+            request = self._read(message)
             if self._session is None:
                 raise messages.MessageError("not ready yet; ask again when the page says ready")
-            if request.type == "simulate":
-                self._session.submit(page, request, box.put_from_thread)
-            elif request.type == "cancel":
-                self._work.cancel(request, box)
-            else:
-                self._work.start(request, self._session, box)
+            self._do(page, request, box)
         except Exception as error:  # told to the page, whose connection lives
             box.put(error_message(request, error))
+
+    def _read(self, message: str | bytes) -> Any:
+        """The request in a message."""
+        return messages.read(message)
+
+    def _do(self, page: int, request: Any, box: Outbox) -> None:
+        if request.type == "simulate":
+            self._session.submit(page, request, box.put_from_thread)
+        elif request.type == "cancel":
+            self._work.cancel(request, box)
+        else:
+            self._work.start(request, self._session, box)
 
 
 def _status(state: str, text: str) -> str:

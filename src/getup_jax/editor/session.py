@@ -9,7 +9,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Protocol
 
 from getup_jax.editor import messages
 from getup_jax.editor.messages import Request
@@ -151,7 +151,21 @@ class Session:
                 self._motions.popitem(last=False)
 
 
-def error_message(request: Request | None, error: Exception) -> str:
+class Asked(Protocol):
+    """A request, as far as an answer names it."""
+
+    @property
+    def type(self) -> str:
+        """Its kind."""
+        ...
+
+    @property
+    def number(self) -> int:
+        """The page's own."""
+        ...
+
+
+def error_message(request: Asked | None, error: Exception) -> str:
     """What a page is told: one line. What is not meant for users is named, and said here."""
     text = str(error)
     if not type(error).__module__.startswith("getup_jax."):

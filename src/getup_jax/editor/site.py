@@ -11,7 +11,7 @@ import hashlib
 import hmac
 import re
 import urllib.parse
-from collections.abc import Collection
+from collections.abc import Mapping
 from http import HTTPStatus
 from pathlib import Path
 
@@ -48,8 +48,11 @@ class Site:
     version: str = ""  # folder of those that never change
 
     @classmethod
-    def of(cls, token: str | None) -> Site:
-        """The files of the package, read once: no name of a request reaches the disk."""
+    def of(cls, token: str | None, index: str = "index.html") -> Site:
+        """The files of the package, read once: no name of a request reaches the disk.
+
+        index: the page that is shown at the address itself.
+        """
         files = {}
         for path in sorted(PAGE.rglob("*")):
             if path.suffix in _TYPES:
@@ -58,7 +61,8 @@ class Site:
         version = hashlib.sha256(b"".join(content for content, _ in files.values())).hexdigest()[
             :16
         ]
-        page, kind = files.pop("index.html")
+        pages = {name: files.pop(name) for name in list(files) if name.endswith(".html")}
+        page, kind = pages[index]
         table = {f"/{name}": file for name, file in files.items()}
         kept = {f"/{version}/{name}": file for name, file in files.items()}
         return cls({**table, **kept, "/": (_versioned(page, version, files), kind)}, token, version)
@@ -102,7 +106,7 @@ def host_name(host: str) -> str | None:
     return None if match is None else (match[1] or match[2]).lower()
 
 
-def _versioned(page: bytes, version: str, files: Collection[str]) -> bytes:
+def _versioned(page: bytes, version: str, files: Mapping[str, tuple[bytes, str]]) -> bytes:
     """The page with its files in their folder, and its modules asked for all at once."""
 
     def moved(match: re.Match[str]) -> str:
@@ -110,9 +114,22 @@ def _versioned(page: bytes, version: str, files: Collection[str]) -> bytes:
         return f'{attribute}="{version}/{name}"' if name in files else match[0]
 
     text = re.sub(r'(href|src)="([^"]+)"', moved, page.decode())
-    modules = sorted(name for name in files if name.endswith(".js"))
+    modules = sorted(_imported(re.findall(rb'src="([^"]+\.js)"', page), files))
     links = "".join(f'  <link rel="modulepreload" href="{version}/{name}">\n' for name in modules)
     return text.replace("</head>", f"{links}</head>").encode()
+
+
+def _imported(names: list[bytes], files: Mapping[str, tuple[bytes, str]]) -> set[str]:
+    """The modules with these names, and all that they import."""
+    found, open_ = set(), [name.decode() for name in names]
+    while open_:
+        name = open_.pop()
+        if name in files and name not in found:
+            found.add(name)
+            folder = name.rpartition("/")[0]
+            for other in re.findall(rb'from "\./([^"]+)"', files[name][0]):
+                open_.append(f"{folder}/{other.decode()}".lstrip("/"))
+    return found
 
 
 def _response(status: HTTPStatus, body: bytes, kind: str, cache: str = _NEVER) -> Response:

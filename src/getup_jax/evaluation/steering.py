@@ -31,12 +31,18 @@ class Player:
     env: Any  # CompositeTask, or MetaTask around it
     world: Any
     policy: Any
+    begin: Callable[..., Any]  # (world, key) -> state of one fresh episode
     step: Callable[..., tuple[Any, Any]]  # (world, policy, state, goals) -> state, StepOutput
+    adopt: Callable[..., Any]  # (world, task's state, goals, key) -> state, see CompositeTask.adopt
 
     @property
     def task(self) -> CompositeTask:
         """The task without a meta policy."""
         return task_of(self.env)
+
+    def goal_states(self, state: Any) -> tuple[Any, ...]:
+        """The states of the goal tasks, in their order."""
+        return self.env.goal_states(state)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -79,10 +85,10 @@ def load_players(
     for name in dict.fromkeys(command.policy for command in script.commands):
         if name is not None:
             other = load_policy(name)
-            _check_alike(other, config, name)
+            check_alike(other, config, f"--script: policy {name}")
             found[name] = (other, dataclasses.replace(other.config, seed=config.seed))
     _check_goals(script, {name: set(_goals(pair[1])) for name, pair in found.items()})
-    return {name: _player(*pair, log) for name, pair in found.items()}
+    return {name: player_of(*pair, log) for name, pair in found.items()}
 
 
 def run_script(players: dict[str | None, Player], script: Script, seed: int) -> Course:
@@ -90,7 +96,7 @@ def run_script(players: dict[str | None, Player], script: Script, seed: int) -> 
     player = players[None]
     dt = player.task.engine.control_dt
     key_start, key_switch = jax.random.split(jax.random.PRNGKey(seed))
-    state = jax.jit(player.env.init, static_argnums=2)(player.world, key_start, 1)
+    state = player.begin(player.world, key_start)
     told = _Told()
     waiting = list(script.commands)
     qpos, markers, lines, fell_s, name = [], [], [], None, ""
@@ -101,17 +107,17 @@ def run_script(players: dict[str | None, Player], script: Script, seed: int) -> 
             if command.policy is not None:
                 name = Path(command.policy).name
                 last, player = player, players[command.policy]
-                state = _switch(last, player, state, jax.random.fold_in(key_switch, step))
+                state = switch(last, player, state, jax.random.fold_in(key_switch, step))
             told.hear(command, now)
         goals = player.task.goals.steer(
-            _goal_states(player, state), told.orders(player.task.goals.names, now)
+            player.goal_states(state), told.orders(player.task.goals.names, now)
         )
         state, output = player.step(player.world, player.policy, state, goals)
         told.see(player, state, output, now + dt)
         if fell_s is None and bool(output.terminated[0]):
             fell_s = now + dt
         one = jax.tree.map(lambda x: np.asarray(x)[0], player.env.kinematics(state))
-        shown = jax.tree.map(lambda x: np.asarray(x)[0], _goal_states(player, state))
+        shown = jax.tree.map(lambda x: np.asarray(x)[0], player.goal_states(state))
         qpos.append(one.qpos)
         markers.append(player.task.goals.markers(shown, one))
         lines.append(" ".join(part for part in (f"{now:.1f} s", name, told.text) if part))
@@ -140,7 +146,7 @@ class _Told:
         """Note the reward, and the moment when a target was reached."""
         task = player.task
         for index, (name, goal) in enumerate(
-            zip(task.goals.names, _goal_states(player, state), strict=True)
+            zip(task.goals.names, player.goal_states(state), strict=True)
         ):
             heard = self._now.get(name)
             if heard is None:
@@ -169,21 +175,18 @@ class _Told:
         ]
 
 
-def _switch(last: Player, player: Player, state: Any, key: jax.Array) -> Any:
+def switch(last: Player, player: Player, state: Any, key: jax.Array) -> Any:
     """The episode goes on with another policy; goals that it shares with the last one stay."""
     task = last.env.task_state(state)
     kept = dict(zip(last.task.goals.names, task.goals, strict=True))
     fresh = player.task.goals.reset(key, task.physics.kinematics)
     names = player.task.goals.names
     goals = tuple(kept.get(name, new) for name, new in zip(names, fresh, strict=True))
-    return player.env.adopt(player.world, task, goals, key)
+    return player.adopt(player.world, task, goals, key)
 
 
-def _goal_states(player: Player, state: Any) -> tuple[Any, ...]:
-    return player.env.goal_states(state)
-
-
-def _player(loaded: LoadedPolicy, config: Config, log: Log) -> Player:
+def player_of(loaded: LoadedPolicy, config: Config, log: Log) -> Player:
+    """A policy in its task, which is built here."""
     log(f"{loaded.path}: {loaded.metadata.get('steps', 0):,} steps of training")
     found = restore(config, loaded, log)
     learner = found.job.learner
@@ -192,31 +195,45 @@ def _player(loaded: LoadedPolicy, config: Config, log: Log) -> Player:
     def step(world: Any, policy: Any, state: Any, goals: Any) -> tuple[Any, Any]:
         task = env.task_state(state)
         state = env.adopt(world, task, goals, task.key)
-        return env.advance(world, state, learner.act(policy, state.observation))
+        state, output = env.advance(world, state, learner.act(policy, state.observation))
+        # what nobody looks at is not computed
+        return state, output.replace(metrics={}, episode={}, extras=None)
 
-    return Player(env, jax.device_put(found.job.world), found.policy, jax.jit(step))
+    begin = jax.jit(lambda world, key: env.init(world, key, 1))
+    world = jax.device_put(found.job.world)
+    return Player(env, world, found.policy, begin, jax.jit(step), jax.jit(env.adopt))
 
 
 def _goals(config: Config) -> dict[str, Any]:
-    assert config.composite is not None  # `_check_alike` has seen to it
+    assert config.composite is not None  # `check_alike` has seen to it
     return config.composite.goals
 
 
-def _check_alike(other: LoadedPolicy, config: Config, name: str) -> None:
-    """Whether a policy moves the same character in the same simulation."""
-    where = f"--script: policy {name}"
+def check_alike(other: LoadedPolicy, config: Config, where: str) -> None:
+    """Raise ConfigError unless a policy moves the same character in the same simulation."""
     if not other.config.composite_motion:
         raise ConfigError(f"{where}: is of the get-up task; expected one of composite motion")
-    if dataclasses.replace(other.config.physics, threads=0, engine=config.physics.engine) != (
-        dataclasses.replace(config.physics, threads=0)
-    ):
-        raise ConfigError(
-            f"{where}: was trained with other physics ({other.config.physics}) than the first "
-            f"policy ({config.physics}); one character cannot go on with both"
-        )
+    check_physics(other.config, config, where)
     if equipment_of(_goals(other.config)) != equipment_of(_goals(config)):
         raise ConfigError(
             f"{where}: plays with other balls or rackets than the first policy; expected the same"
+        )
+
+
+def check_physics(other: Config, config: Config, where: str) -> None:
+    """Raise ConfigError unless both have the same character and the same simulation."""
+    body, first = other.physics.character, config.physics.character
+    if body != first:
+        raise ConfigError(
+            f"{where}: moves another character ({body}) than the first policy ({first}); "
+            "expected a policy of the same one"
+        )
+    if dataclasses.replace(other.physics, threads=0, engine=config.physics.engine) != (
+        dataclasses.replace(config.physics, threads=0)
+    ):
+        raise ConfigError(
+            f"{where}: was trained with other physics ({other.physics}) than the first "
+            f"policy ({config.physics}); one character cannot go on with both"
         )
 
 

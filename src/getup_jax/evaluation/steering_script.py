@@ -84,15 +84,18 @@ def _command(found: Any, where: str, duration_s: float) -> Command:
             f"{where}.policy: expected a run folder or a checkpoint, got {shown(policy)}"
         )
     targets = {
-        name: _order(name, found[name], f"{where}.{name}") for name in GOALS if name in found
+        name: read_order(name, found[name], f"{where}.{name}") for name in GOALS if name in found
     }
     if policy is None and not targets:
         raise ConfigError(f"{where}: expected a policy or one of {', '.join(GOALS)}")
     return Command(at_s, policy, targets)
 
 
-def _order(goal: str, found: Any, where: str) -> dict[str, Any]:
-    """The numbers that a goal's `steer` reads, with its defaults for those not given."""
+def read_order(goal: str, found: Any, where: str) -> dict[str, Any]:
+    """The numbers that a goal's `steer` reads, with its defaults for those not given.
+
+    Raises ConfigError that names the place, what was expected and what came.
+    """
     known: Mapping[str, tuple[int, Any]] = getattr(GOALS[goal], "orders", {})
     if not known:
         raise ConfigError(f"{where}: cannot be steered; leave it out")
