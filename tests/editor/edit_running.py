@@ -39,10 +39,10 @@ class Quick:
 class Running:
     """A server in a thread of its own."""
 
-    def __init__(self, build, token=None, host="127.0.0.1"):
+    def __init__(self, build, token=None, host="127.0.0.1", app=App):
         self.said: list[str] = []
         self.error: BaseException | None = None
-        self._app = App(build, Site.of(token))
+        self._app = app(build, Site.of(token))
         self._loop = asyncio.new_event_loop()
         self._task = self._loop.create_task(self._app.run(host, 0, self.said.append))
         self._thread = threading.Thread(target=self._run, daemon=True)

@@ -99,6 +99,8 @@ def test_a_port_in_use_is_said(site, capsys, monkeypatch):
         (["--port", "http"], "expected a port"),
         (["--host", "0.0.0.0"], "other machines could reach it; give a --token as well"),
         (["--token", "short"], "expected at least 12 letters and digits"),
+        (["--ckpt", "walk", "--ckpt=walk_aim"], "expected one policy, the first; name the others"),
+        (["--with"], "expected at least one argument"),
         (["--token", "a b c d e f g h"], "expected at least 12 letters and digits"),
     ],
 )
@@ -109,12 +111,9 @@ def test_bad_arguments_are_refused(arguments, text, capsys):
     assert text in capsys.readouterr().err
 
 
-def test_a_policy_that_follows_no_curves_is_refused_with_what_opens_it(monkeypatch, capsys):
-    config = types.SimpleNamespace(composite_motion=True)
-    loaded = types.SimpleNamespace(config=config, path="runs/walk")
-    monkeypatch.setattr(server.checkpoint, "load_policy", lambda path: loaded)
-    assert main.edit_main(["--ckpt", "runs/walk", "--port", "0"]) != 0
-    said = capsys.readouterr().err
-    assert "runs/walk: a policy of composite motion" in said
-    assert "getup-eval --ckpt" in said
-    assert "Traceback" not in said
+def test_options_of_steering_are_refused_where_curves_are_drawn(capsys):
+    for option in ("--with", "--getup"):
+        assert main.edit_main(["--ckpt", "flat", option, "walk", "--port", "0"]) == 2
+        said = capsys.readouterr().err
+        assert said.startswith(f"EditorError: {option}: is for policies of composite motion")
+        assert said.count("\n") == 1

@@ -34,6 +34,7 @@ class Player:
     begin: Callable[..., Any]  # (world, key) -> state of one fresh episode
     step: Callable[..., tuple[Any, Any]]  # (world, policy, state, goals) -> state, StepOutput
     adopt: Callable[..., Any]  # (world, task's state, goals, key) -> state, see CompositeTask.adopt
+    new_goals: Callable[..., tuple[Any, ...]]  # (key, kinematics) -> states of the goal tasks
 
     @property
     def task(self) -> CompositeTask:
@@ -179,7 +180,7 @@ def switch(last: Player, player: Player, state: Any, key: jax.Array) -> Any:
     """The episode goes on with another policy; goals that it shares with the last one stay."""
     task = last.env.task_state(state)
     kept = dict(zip(last.task.goals.names, task.goals, strict=True))
-    fresh = player.task.goals.reset(key, task.physics.kinematics)
+    fresh = player.new_goals(key, task.physics.kinematics)
     names = player.task.goals.names
     goals = tuple(kept.get(name, new) for name, new in zip(names, fresh, strict=True))
     return player.adopt(player.world, task, goals, key)
@@ -201,7 +202,8 @@ def player_of(loaded: LoadedPolicy, config: Config, log: Log) -> Player:
 
     begin = jax.jit(lambda world, key: env.init(world, key, 1))
     world = jax.device_put(found.job.world)
-    return Player(env, world, found.policy, begin, jax.jit(step), jax.jit(env.adopt))
+    new_goals = jax.jit(task_of(env).goals.reset)
+    return Player(env, world, found.policy, begin, jax.jit(step), jax.jit(env.adopt), new_goals)
 
 
 def _goals(config: Config) -> dict[str, Any]:

@@ -76,6 +76,7 @@ class Character:
             if zeros:
                 self.order(goal.name, zeros)
         self.step()
+        self._state = switch(self._player, self._player, self._state, self._new_key())
         self.push(0.0)
         self._adopt(self._limp(self._episode))
         if self._rising is not None:
@@ -87,7 +88,7 @@ class Character:
 
     def order(self, goal: str, order: dict[str, Any]) -> None:
         """Set the target of a goal, for all policies that know it."""
-        self._told.hear(goal, order, self._now)
+        self._told.hear(goal, order)
 
     def switch(self, name: str) -> None:
         """Another policy acts from now on; pose, velocities and shared targets stay."""
@@ -107,7 +108,7 @@ class Character:
 
     def step(self) -> Frame:
         """One control step."""
-        self._now += self._player.task.engine.control_dt
+        now, self._now = self._now, self._now + self._player.task.engine.control_dt
         rewards: dict[str, float] = {}
         where = self._where()
         if self._getting_up is not None:
@@ -115,17 +116,17 @@ class Character:
         elif self._lain is not None:
             self._lie()
         else:
-            rewards = self._act()
+            rewards = self._act(now)
         if not bool(self._episode.physics.kinematics.finite[0]):
             self._words = "The simulation failed"
             self._put_back(*where)
         return self._frame(rewards)
 
-    def _act(self) -> dict[str, float]:
-        """A step of the policy; the rewards of its goals."""
+    def _act(self, now: float) -> dict[str, float]:
+        """A step of the policy from a time (s) on; the rewards of its goals."""
         player, names = self._player, self._player.task.goals.names
         goals = player.task.goals.steer(
-            player.goal_states(self._state), self._told.orders(names, self._now)
+            player.goal_states(self._state), self._told.orders(names, now)
         )
         self._state, output = player.step(player.world, player.policy, self._state, goals)
         self._told.see(names, player.goal_states(self._state), self._now)
@@ -190,11 +191,18 @@ class Character:
         }
         said = {"time": round(self._now, 3), "policy": self.name, "goals": goals}
         said |= {"falls": self._falls, "words": self._words, "phase": self._phase()}
+        said["on_feet_in_s"] = self._on_feet_in()
         said["balls"] = [
             _plain(Marker(place, radius=ball.radius_m, rgba=ball.rgba))
             for ball, place in zip(player.task.goals.balls, _balls(one), strict=True)
         ]
         return Frame(np.concatenate([one.link_position, one.link_quaternion], axis=1), said)
+
+    def _on_feet_in(self) -> float | None:
+        """Seconds until it is put back on its feet; None: it is not, or gets up by itself."""
+        if self._lain is None or self._rising is not None:
+            return None
+        return round(max(LIES_S - self._lain, 0.0), 2)
 
     def _phase(self) -> str:
         if self._lain is None:

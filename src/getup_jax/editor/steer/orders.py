@@ -12,7 +12,7 @@ class Heard:
     """One order."""
 
     order: dict[str, Any]
-    at_s: float
+    since_s: float | None = None  # when a policy first heard it; None: none that acts did yet
     reached_after_s: float | None = None
 
 
@@ -22,23 +22,27 @@ class Told:
     def __init__(self) -> None:
         self._heard: dict[str, Heard] = {}
 
-    def hear(self, goal: str, order: dict[str, Any], now: float) -> None:
-        """An order at a time (s)."""
-        self._heard[goal] = Heard(order, now)
+    def hear(self, goal: str, order: dict[str, Any]) -> None:
+        """An order, in place of the last one."""
+        self._heard[goal] = Heard(order)
 
     def orders(self, names: Sequence[str], now: float) -> dict[str, tuple[dict[str, Any], float]]:
-        """Of the goals that are known now: the order and its age (s), as `Goals.steer` wants it."""
-        held = {goal: heard for goal, heard in self._heard.items() if goal in names}
-        return {goal: (heard.order, now - heard.at_s) for goal, heard in held.items()}
+        """Of the goals that act now (s): the order and its age (s), as `Goals.steer` wants it."""
+        found = {}
+        for goal in self._heard.keys() & set(names):
+            heard = self._heard[goal]
+            heard.since_s = now if heard.since_s is None else heard.since_s
+            found[goal] = (heard.order, now - heard.since_s)
+        return found
 
     def see(self, names: Sequence[str], states: Sequence[Any], now: float) -> None:
         """Note the moment when a target was reached."""
         for name, state in zip(names, states, strict=True):
             heard, reached = self._heard.get(name), getattr(state, "reached", None)
-            if heard is None or reached is None or heard.reached_after_s is not None:
+            if heard is None or heard.since_s is None or heard.reached_after_s is not None:
                 continue
-            if bool(reached[0]):
-                heard.reached_after_s = now - heard.at_s
+            if reached is not None and bool(reached[0]):
+                heard.reached_after_s = now - heard.since_s
 
     def plain(self, goal: str) -> dict[str, Any] | None:
         """The order for a goal, and after how long it was reached (s); None: there is none."""
