@@ -54,3 +54,10 @@ def test_other_physics_and_other_balls_do_not_fit(tmp_path):
     with pytest.raises(ConfigError, match=r"--with .*other balls or rackets"):
         choose("walk", walk, [juggler], None)
     assert list(choose(juggler, load_policy(juggler), [], None).offers) == [juggler]
+
+
+def test_a_getup_policy_of_the_same_body_fits_under_other_names(getup_path):
+    found = choose("walk", load_policy("walk"), [], str(getup_path))
+    assert found.getup is not None
+    assert found.getup.path == getup_path
+    assert found.getup.config.physics.character == "humanoid28_getup"

@@ -8,16 +8,11 @@ import math
 import jax
 import numpy as np
 import pytest
-from edit_samples import make_task
 from numpy.testing import assert_allclose
 from tiny_task import supine
 
-from eval_samples import SMALL, save_policy
-from getup_jax.editor.simulate import editor_config
 from getup_jax.editor.steer import recovery
-from getup_jax.editor.steer.recovery import GetUp
 from getup_jax.envs.composite.link_frames import observe
-from getup_jax.runtime.checkpoint import load_policy
 
 
 def test_a_moved_episode_is_the_same_in_its_own_frame_and_goes_on_alike(policies):
@@ -50,38 +45,34 @@ def test_a_start_at_a_place_that_is_no_number_is_where_it_is(policies):
     assert_allclose(player.env.kinematics(found).qpos, player.env.kinematics(usual).qpos)
 
 
-@pytest.fixture(scope="module")
-def getup(tmp_path_factory) -> GetUp:
-    """An untrained policy that gets up, or rather does not."""
-    task = make_task(editor_config(SMALL))
-    return GetUp.of(task, load_policy(save_policy(tmp_path_factory.mktemp("up") / "up", task)))
+def pose_of(player, qpos: np.ndarray):
+    return qpos[None], np.zeros((1, player.task.character.model.nv))
 
 
-def placed(getup: GetUp, qpos: np.ndarray):
-    engine, model = getup.task.environment.engine, getup.task.environment.character.model
-    return engine.place(qpos[None], np.zeros((1, model.nv)))
-
-
-def test_a_getup_policy_goes_on_from_how_the_body_lies(getup):
-    qpos = supine(getup.task.environment.character)
-    qpos[:2] = 4.0, 1.0
-    lying = placed(getup, qpos)
-    state = getup.begin(lying)
-    assert_allclose(getup.physics(state).kinematics.qpos, lying.kinematics.qpos)
+def test_a_getup_policy_goes_on_from_how_the_body_lies(policies, getup):
+    player = policies.players[policies.first]
+    lying = supine(player.task.character)
+    lying[:2] = 4.0, 1.0
+    state = getup.begin(*pose_of(player, lying))
+    assert_allclose(getup.pose(state)[0][0], lying, atol=1e-5)
     assert getup.stands(state) is None
     for _ in range(10):
         state = getup.step(state)
-    now = np.asarray(getup.physics(state).kinematics.qpos)
-    assert_allclose(now[0, :2], [4.0, 1.0], atol=0.5)  # the episode goes on there
+    qpos, qvel = getup.pose(state)
+    assert_allclose(qpos[0, :2], [4.0, 1.0], atol=0.5)  # the episode goes on there
+    placed = player.task.engine.place(qpos, qvel).kinematics  # the body that fell, in its pose
+    own = state[0].physics.kinematics
+    feet = [c.link("foot_l") for c in (player.task.character, getup.task.environment.character)]
+    assert_allclose(placed.link_position[0, feet[0]], own.link_position[0, feet[1]], atol=1e-4)
     assert getup.stands(state) is None
     episode, _ = state
     late = episode.replace(time=episode.duration + 3.1)
     assert getup.stands((late, 0)) is False
 
 
-def test_a_body_that_is_up_for_half_a_second_stands(getup):
-    state = getup.begin(placed(getup, getup.task.environment.character.neutral_qpos))
-    said = []
+def test_a_body_that_is_up_for_half_a_second_stands(policies, getup):
+    player = policies.players[policies.first]
+    state, said = getup.begin(*pose_of(player, player.task.character.neutral_qpos)), []
     for _ in range(15):
         state = getup.step(state)
         said.append(getup.stands(state))
@@ -90,9 +81,8 @@ def test_a_body_that_is_up_for_half_a_second_stands(getup):
 
 def test_it_follows_the_style_that_starts_most_alike(getup):
     clip = getup.task.getups[0]
-    turned = dataclasses.replace(clip, points=clip.points + [0.0, -1.0, 0.0])
-    both = dataclasses.replace(getup.task, getups=(turned, clip))
+    turned = dataclasses.replace(clip, points=clip.points + np.array([0.0, -1.0, 0.0]))
     qpos = supine(getup.task.environment.character)[None]
-    assert dataclasses.replace(getup, task=both)._style(qpos) == 1
-    other = dataclasses.replace(getup.task, getups=(clip, turned))
-    assert dataclasses.replace(getup, task=other)._style(qpos) == 0
+    for styles, nearest in (((turned, clip), 1), ((clip, turned), 0)):
+        task = dataclasses.replace(getup.task, getups=styles)
+        assert dataclasses.replace(getup, task=task)._style(qpos) == nearest

@@ -80,9 +80,8 @@ class Character:
         self.push(0.0)
         self._adopt(self._limp(self._episode))
         if self._rising is not None:
-            getting_up = self._rising.step(self._rising.begin(self._episode.physics))
-            self._rising.stands(getting_up)
-            self._adopt(self._followed(self._episode, self._rising.physics(getting_up)))
+            self._begin_to_rise()
+            self._get_up()
         self._put_back(*self._where())
         self.restart()
 
@@ -142,14 +141,20 @@ class Character:
         self._lain += self._player.task.engine.control_dt
         self._adopt(self._limp(self._episode))
         if self._rising is not None and self._lain >= _RESTS_S:
-            self._getting_up = self._rising.begin(self._episode.physics)
+            self._begin_to_rise()
         elif self._lain >= LIES_S:
             self._put_back(*self._where())
+
+    def _begin_to_rise(self) -> None:
+        assert self._rising is not None
+        seen = self._episode.physics.kinematics
+        self._getting_up = self._rising.begin(np.asarray(seen.qpos), np.asarray(seen.qvel))
 
     def _get_up(self) -> None:
         assert self._rising is not None
         self._getting_up = self._rising.step(self._getting_up)
-        self._adopt(self._followed(self._episode, self._rising.physics(self._getting_up)))
+        physics = self._player.task.engine.place(*self._rising.pose(self._getting_up))
+        self._adopt(self._followed(self._episode, physics))
         stands = self._rising.stands(self._getting_up)
         if stands:
             self._lain, self._getting_up, self._words = None, None, "It stood up by itself"

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from getup_jax.config import Config, ConfigError
+import numpy as np
+
+from getup_jax.config import Config, ConfigError, PhysicsConfig
 from getup_jax.core.resources import asset_path
 from getup_jax.editor.steer.character import Character
 from getup_jax.editor.steer.recovery import GetUp
@@ -14,6 +17,7 @@ from getup_jax.envs.composite.goals.combine import GOALS, equipment_of
 from getup_jax.evaluation.composite import evaluation_config
 from getup_jax.evaluation.scenario import Scenario
 from getup_jax.evaluation.steering import Player, check_alike, check_physics, player_of
+from getup_jax.physics.character import load_character
 from getup_jax.runtime.checkpoint import CHECKPOINTS, LoadedPolicy, load_policy
 from getup_jax.training.run import Log
 
@@ -121,13 +125,27 @@ def _check_getup(other: LoadedPolicy, config: Config, where: str) -> None:
         raise ConfigError(f"{where}: is of composite motion; expected a policy that gets up")
     if other.config.terrain is not None:
         raise ConfigError(f"{where}: was trained on irregular ground; expected one of flat ground")
-    check_physics(other.config, config, where)
     assert config.composite is not None
+    physics = other.config.physics
+    if same_hinges(physics, config.physics):  # also under other names
+        physics = dataclasses.replace(physics, character=config.physics.character)
+    check_physics(dataclasses.replace(other.config, physics=physics), config, where)
     if equipment_of(config.composite.goals) != equipment_of(()):
         raise ConfigError(
             f"{where}: gets up with empty hands, but the first policy plays with balls or a "
             "racket; leave it out"
         )
+
+
+def same_hinges(one: PhysicsConfig, two: PhysicsConfig) -> bool:
+    """Whether two characters are one body, perhaps under other names: what moves one moves both."""
+    if one.character == two.character:
+        return True
+    a, b = load_character(one), load_character(two)
+    if a.num_joints != b.num_joints or not math.isclose(a.weight, b.weight, rel_tol=1e-3):
+        return False
+    fields = ("neutral_qpos", "joint_lower", "joint_upper", "torque_limit")
+    return all(np.allclose(getattr(a, f), getattr(b, f), atol=1e-4) for f in fields)
 
 
 def _fits(check: Any) -> bool:

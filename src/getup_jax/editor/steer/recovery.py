@@ -31,16 +31,16 @@ _PATIENCE_S = 3.0  # past the end of its curve; then it has not stood up
 class Rising(Protocol):
     """What gets a lying character up."""
 
-    def begin(self, physics: PhysicsState) -> Any:
-        """Its own state, from how the character lies now."""
+    def begin(self, qpos: np.ndarray, qvel: np.ndarray) -> Any:
+        """Its own state, from how the character lies now: [1, 7 + J] and [1, 6 + J]."""
         ...
 
     def step(self, state: Any) -> Any:
         """One control step."""
         ...
 
-    def physics(self, state: Any) -> PhysicsState:
-        """The simulation of a state."""
+    def pose(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
+        """The character's qpos [1, 7 + J] and qvel [1, 6 + J]."""
         ...
 
     def stands(self, state: Any) -> bool | None:
@@ -50,7 +50,10 @@ class Rising(Protocol):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class GetUp:
-    """A trained get-up policy, which follows the curve of the style that starts most alike."""
+    """A trained get-up policy, which follows the curve of the style that starts most alike.
+
+    Its character may have other names and links, but not other hinges, than the one that fell.
+    """
 
     task: BuiltTask
     name: str
@@ -87,12 +90,11 @@ class GetUp:
         compiled = [jax.jit(f, compiler_options=options) for f in (start, advance, ratio)]
         return cls(task, loaded.path.name, *compiled)
 
-    def begin(self, physics: PhysicsState) -> tuple[EpisodeState, int]:
+    def begin(self, qpos: np.ndarray, qvel: np.ndarray) -> tuple[EpisodeState, int]:
         """An episode from how the body lies, and for how many steps it has stood."""
-        styles = len(self.task.getups)
-        table = jnp.zeros((3, 1, styles, 1), jnp.int32)
+        physics = self.task.environment.engine.place(qpos, qvel)
+        table = jnp.zeros((3, 1, len(self.task.getups), 1), jnp.int32)
         world = self.task.world.replace(pool=Pool(physics, jnp.zeros(1), table))
-        qpos = np.asarray(physics.kinematics.qpos, np.float64)
         return self.start(world, np.array([self._style(qpos)], np.int32)), 0
 
     def _style(self, qpos: np.ndarray) -> int:
@@ -107,9 +109,10 @@ class GetUp:
         upright = float(self.ratio(episode)) >= STAND_LOWEST  # NaN is not
         return episode, state[1] + 1 if upright else 0
 
-    def physics(self, state: tuple[EpisodeState, int]) -> PhysicsState:
-        """The simulation of a state."""
-        return state[0].physics
+    def pose(self, state: tuple[EpisodeState, int]) -> tuple[np.ndarray, np.ndarray]:
+        """The character's qpos [1, 7 + J] and qvel [1, 6 + J]."""
+        seen = state[0].physics.kinematics
+        return np.asarray(seen.qpos), np.asarray(seen.qvel)
 
     def stands(self, state: tuple[EpisodeState, int]) -> bool | None:
         """Whether it stands; None: not yet, but it may; False: it did not manage to."""
