@@ -27,10 +27,11 @@ let buffer;
 let frame = null;
 let poses = new Float32Array(7);
 let playing = true, last = performance.now();
-/** @type {{ place: [number, number], until: number } | null} */
-let pending = null;
-/** @type {Map<string, object>} orders of drags, the newest of each goal */
+/** @typedef {import("./steer_markers.js").Marker} Marker */
+/** @type {Map<string, object>} orders that wait for the next picture, the newest of each goal */
 const held = new Map();
+/** @type {Map<string, { order: string, change: (marker: Marker) => Marker }>} what frames do not show yet */
+const asked = new Map();
 
 // From the server.
 
@@ -107,14 +108,17 @@ function show(next) {
   markers.show(shown(next));
 }
 
-/** All that is asked for. @param {any} next @returns {import("./steer_markers.js").Marker[]} */
+/** All that is asked for; what the server has not heard yet is shown as it will be. @param {any} next @returns {Marker[]} */
 function shown(next) {
   const found = [...next.balls];
   for (const [name, goal] of Object.entries(next.goals)) {
-    const flat = floorGoal(panel.goals)?.[0] === name, radius = panel.goals[name]?.radius_m;
-    for (const marker of goal.markers) found.push(flat && !marker.reach ? { ...marker, flat, radius: radius ?? marker.radius, rgba: [...marker.rgba.slice(0, 3), 0.5] } : marker);
+    if (asked.get(name)?.order === JSON.stringify(goal.told?.order)) asked.delete(name);
+    const flat = floorGoal(panel.goals)?.[0] === name, change = asked.get(name)?.change, radius = panel.goals[name]?.radius_m;
+    for (const marker of goal.markers) {
+      const onIt = flat && !marker.reach ? { ...marker, flat, radius: radius ?? marker.radius, rgba: [...marker.rgba.slice(0, 3), 0.5] } : marker;
+      found.push(change ? change(onIt) : onIt);
+    }
   }
-  if (pending && performance.now() < pending.until) found.push({ position: [...pending.place, 0.01], reach: null, radius: 0.3, rgba: PENDING, flat: true });
   return found;
 }
 
@@ -122,16 +126,25 @@ function body() { return [poses[0], poses[1]]; }
 
 // What is told.
 
-/** @param {string} goal @param {object} order */
-function order(goal, order) { held.set(goal, order); }
+/** @param {string} goal @param {object} order @param {(marker: Marker) => Marker} change of its markers */
+function order(goal, order, change = (marker) => marker) {
+  held.set(goal, order);
+  asked.set(goal, { order: JSON.stringify(order), change });
+  if (!view || !frame) return;
+  markers.show(shown(frame));
+  view.dirty = true;
+}
 
 /** @param {string} name */
-function policy(name) { link.send({ type: "policy", name }); }
+function policy(name) {
+  asked.clear();
+  link.send({ type: "policy", name });
+}
 
 function knobs() {
   if (!frame) return [];
   const { goals } = frame;
-  return directions(panel.goals).flatMap((goal) => (goals[goal]?.markers ?? []).filter((/** @type {any} */ m) => m.reach).map((/** @type {any} */ m) => ({ goal, tip: tip(m) })));
+  return directions(panel.goals).flatMap((goal) => (goals[goal]?.markers ?? []).filter((/** @type {Marker} */ m) => m.reach).map((/** @type {Marker} */ m) => ({ goal, tip: tip(m) })));
 }
 
 /** @param {[number, number] | null} place */
@@ -140,19 +153,25 @@ function click(place) {
   const goals = panel.goals, floor = floorGoal(goals), to = near(body(), place);
   if (floor) {
     const [goal, key] = floor;
-    order(goal, key === "place" ? placeOrder(body(), to, goals[goal]) : { [key]: to });
-    pending = { place: to, until: performance.now() + 300 };
-  } else if ("target_heading" in goals) order("target_heading", headingOrder(body(), to, goals.target_heading));
+    order(goal, key === "place" ? placeOrder(body(), to, goals[goal]) : { [key]: to }, (marker) => (marker.reach ? marker : { ...marker, position: [...to, 0], rgba: PENDING }));
+  } else if ("target_heading" in goals) turn(to);
   else say(`${panel.acting} has no goal on the floor: there is nothing to tell it there.`);
+}
+
+/** Walk that way. @param {number[]} place */
+function turn(place) {
+  const heading = headingOrder(body(), place, panel.goals.target_heading), yaw = (heading.yaw_deg * Math.PI) / 180;
+  order("target_heading", heading, (marker) => ({ ...marker, reach: [heading.speed * Math.cos(yaw), heading.speed * Math.sin(yaw), 0] }));
 }
 
 /** @param {string} goal @param {import("./steer_goals.js").Point} origin @param {import("./steer_goals.js").Point} along */
 function drag(goal, origin, along) {
-  const marker = frame?.goals[goal]?.markers.find((/** @type {any} */ m) => m.reach), settings = panel.goals[goal];
-  if (!marker || !settings) return;
-  if ("pitch_deg" in settings.orders) return order(goal, aimOrder(onSphere(origin, along, marker.position, Math.hypot(...marker.reach))));
+  const arrow = frame?.goals[goal]?.markers.find((/** @type {Marker} */ m) => m.reach);
+  if (!arrow) return;
   const place = onFloor(origin, along);
-  if (place) order(goal, headingOrder(marker.position, place, settings));
+  if (goal === "target_heading") return place && turn(place);
+  const length = Math.hypot(...arrow.reach), reach = onSphere(origin, along, arrow.position, length), share = length / Math.hypot(...reach);
+  order(goal, aimOrder(reach), (marker) => (marker.reach ? { ...marker, reach: reach.map((r) => share * r) } : marker));
 }
 
 // The bar below, and keys.
@@ -169,6 +188,7 @@ function push() {
 
 function restart() {
   toggle(true);
+  asked.clear();
   link.send({ type: "restart" });
 }
 
