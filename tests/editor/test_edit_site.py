@@ -108,7 +108,10 @@ def test_the_page_asks_at_once_for_all_of_its_files_and_a_browser_may_keep_them(
     folders = {name.split("/")[0] for name in named}
     assert len(folders) == 1
     modules = {path.relative_to(PAGE).as_posix() for path in PAGE.rglob("*.js")}
-    assert {name.partition("/")[2] for name in named} >= modules | {"style.css", "graph.css"}
+    steering = {name for name in modules if name.startswith("steer")}
+    asked = {name.partition("/")[2] for name in named}
+    assert asked >= modules - steering | {"style.css", "graph.css"}
+    assert not asked & steering  # those of the other page
     for name in named:
         code, content, headers = get(site, f"/{name}")
         assert (code, headers["Cache-Control"]) == (200, "max-age=31536000, immutable")
@@ -149,3 +152,12 @@ def test_what_is_no_request_says_nothing_on_the_terminal(site, sent, capfd):
     assert get(site, "/")[0] == 200
     captured = capfd.readouterr()
     assert "Traceback" not in captured.out + captured.err
+
+
+def test_the_page_that_steers_asks_for_its_own_files_alone():
+    page = Site.of(None, "steer.html").files["/"][0].decode()
+    assert "<title>getup-edit: steer</title>" in page
+    asked = {name.partition("/")[2] for name in re.findall(r'(?:href|src)="([^"]+)"', page)}
+    steering = {path.name for path in PAGE.glob("steer*") if path.suffix != ".html"}
+    assert asked >= steering | {"style.css", "view.js", "link.js", "vendor/three.min.js"}
+    assert not {"main.js", "graph.css", "steer.html", "index.html"} & asked

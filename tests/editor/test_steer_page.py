@@ -98,10 +98,7 @@ def test_an_arrow_is_dragged_by_its_tip(steered):
         page.wait_for_timeout(500)
         assert frame(page) <= begin + 2  # paused: the server waits, too
         page.keyboard.press("Space")
-        page.wait_for_function(
-            "() => /^-?\\d+°, -?\\d+° up$/.test(document.querySelector('[data-goal=aiming] p').textContent)",
-            timeout=30_000,
-        )
+        says(page, "goals", "° up")
         slider = page.get_by_label("Aim the right arm: Turn")
         slider.evaluate("e => { e.value = 15; e.dispatchEvent(new Event('input')); }")
         says(page, "goals", "15°, ")
@@ -154,7 +151,7 @@ def test_a_policy_that_was_not_named_is_compiled_when_it_is_chosen(steered):
 
 def test_pages_have_a_character_each_and_a_reload_another_one(steered):
     with opened(steered) as page:
-        other = page.context.new_page()
+        other = page.context.browser.new_page()
         other.goto(steered)
         until_frame(other, 10)
         other.bring_to_front()

@@ -200,10 +200,17 @@ def player_of(loaded: LoadedPolicy, config: Config, log: Log) -> Player:
         # what nobody looks at is not computed
         return state, output.replace(metrics={}, episode={}, extras=None)
 
+    compiled = jax.jit(env.adopt)
+
+    def adopt(world: Any, state: Any, goals: Any, key: jax.Array) -> Any:
+        # without what is made anew and differs from policy to policy: one program for all
+        own = ("observation", "goals", "attempts", "successes", "key")
+        return compiled(world, state.replace(**dict.fromkeys(own)), goals, key)
+
     begin = jax.jit(lambda world, key: env.init(world, key, 1))
     world = jax.device_put(found.job.world)
     new_goals = jax.jit(task_of(env).goals.reset)
-    return Player(env, world, found.policy, begin, jax.jit(step), jax.jit(env.adopt), new_goals)
+    return Player(env, world, found.policy, begin, jax.jit(step), adopt, new_goals)
 
 
 def _goals(config: Config) -> dict[str, Any]:

@@ -82,6 +82,7 @@ def test_after_a_fall_it_is_put_back_where_it_fell_and_says_so(character):
     lay_down(character)
     fell = until(character, "lies", 3)[-1]
     assert (fell.said["words"], fell.said["falls"]) == ("It fell", 1)
+    assert fell.said["goals"]["target_location"]["reward"] is None
     assert fell.said["on_feet_in_s"] == LIES_S
     frames = until(character, "acts")
     assert len(frames) == round(LIES_S * 30)

@@ -64,7 +64,7 @@ export class Panel {
       const input = el("input", { type: "range", min: low, max: high, step, ".value": (low + high) / 2, oninput: send, "aria-label": `${title(goal)}: ${LABELS[key]}` });
       sliders[key] = { input, output: el("output"), unit };
     }
-    const rows = Object.entries(sliders).map(([key, { input, output }]) => el("label", {}, LABELS[key], input, output));
+    const rows = Object.entries(sliders).map(([key, { input, output }]) => el("label", {}, el("span", {}, LABELS[key]), input, output));
     const all = el("section", { class: "goal", "data-goal": goal }, el("h2", {}, title(goal), value), told, el("div", { class: "bar", title: "Reward now, 0 to 1" }, bar), ...rows);
     return { all, told, value, bar, sliders };
   }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from getup_jax.core.types import Kinematics
+from getup_jax.core.types import Kinematics, PhysicsState
 from getup_jax.editor.steer import recovery
 from getup_jax.editor.steer.orders import Told
 from getup_jax.envs.composite.goals import Marker
@@ -45,11 +44,7 @@ class Character:
         self._players, self._rising = players, rising
         self._key = jax.random.PRNGKey(seed)
         self.name = next(iter(players))  # of the policy that acts
-        engine = self._player.task.engine
-        self._limp = jax.jit(
-            functools.partial(recovery.limp, engine), compiler_options=engine.compiler_options
-        )
-        self._followed = jax.jit(recovery.followed)
+        self._limp = recovery.limp(self._player.task.engine)
         self.restart()
 
     @property
@@ -78,7 +73,7 @@ class Character:
         self.step()
         self._state = switch(self._player, self._player, self._state, self._new_key())
         self.push(0.0)
-        self._adopt(self._limp(self._episode))
+        self._go_on(self._limp(self._episode.physics))
         if self._rising is not None:
             self._begin_to_rise()
             self._get_up()
@@ -133,13 +128,14 @@ class Character:
             self._lain, self._falls = 0.0, self._falls + 1
             cause = next(name for name, ended in output.ended.items() if bool(ended[0]))
             self._words = "It fell" if cause == "fall" else f"{cause}: failed"
+            return {}  # what a fall costs is no reward of a goal
         values = np.asarray(output.reward)[0, len(player.task.groups) :]
         return dict(zip(names, values.tolist(), strict=False))
 
     def _lie(self) -> None:
         assert self._lain is not None
         self._lain += self._player.task.engine.control_dt
-        self._adopt(self._limp(self._episode))
+        self._go_on(self._limp(self._episode.physics))
         if self._rising is not None and self._lain >= _RESTS_S:
             self._begin_to_rise()
         elif self._lain >= LIES_S:
@@ -154,7 +150,7 @@ class Character:
         assert self._rising is not None
         self._getting_up = self._rising.step(self._getting_up)
         physics = self._player.task.engine.place(*self._rising.pose(self._getting_up))
-        self._adopt(self._followed(self._episode, physics))
+        self._go_on(physics)
         stands = self._rising.stands(self._getting_up)
         if stands:
             self._lain, self._getting_up, self._words = None, None, "It stood up by itself"
@@ -172,6 +168,11 @@ class Character:
         player = self._player
         goals = player.goal_states(self._state)
         self._state = player.adopt(player.world, episode, goals, self._new_key())
+
+    def _go_on(self, physics: PhysicsState) -> None:
+        """The episode after a control step that no policy of composite motion took."""
+        history = recovery.followed(self._episode.history, physics)
+        self._adopt(self._episode.replace(physics=physics, history=history))
 
     def _where(self) -> tuple[np.ndarray, float]:
         """Where the root is [2] (m), and which way it faces (rad)."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import jax
@@ -160,14 +162,17 @@ def _turned_quaternions(turn: Rotation, quaternions: np.ndarray) -> np.ndarray:
     return found.as_quat(scalar_first=True).reshape(quaternions.shape)
 
 
-def followed(state: CompositeState, physics: PhysicsState) -> CompositeState:
-    """The episode after a control step that somebody else took for it, in its history."""
-    frame = link_state(physics.kinematics)
-    history = jnp.concatenate([state.history[:, 1:], frame[:, None]], axis=1)
-    return state.replace(physics=physics, history=history)
+@jax.jit
+def followed(history: jax.Array, physics: PhysicsState) -> jax.Array:
+    """The history after a control step that somebody else took."""
+    return jnp.concatenate([history[:, 1:], link_state(physics.kinematics)[:, None]], axis=1)
 
 
-def limp(engine: Engine, state: CompositeState) -> CompositeState:
-    """The episode after a control step in which the servos hold nothing, they only damp."""
-    hinges = state.physics.kinematics.qpos[:, 7:]
-    return followed(state, engine.step(state.physics, hinges))
+@functools.cache  # one program for all characters
+def limp(engine: Engine) -> Callable[[PhysicsState], PhysicsState]:
+    """A control step in which the servos hold nothing, they only damp."""
+
+    def step(physics: PhysicsState) -> PhysicsState:
+        return engine.step(physics, physics.kinematics.qpos[:, 7:])
+
+    return jax.jit(step, compiler_options=engine.compiler_options)
