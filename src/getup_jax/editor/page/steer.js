@@ -60,6 +60,7 @@ function ready(description) {
   if (scene && JSON.stringify([scene.links, scene.shapes]) !== JSON.stringify([description.links, description.shapes])) return location.reload();
   scene = description;
   buffer = new Buffer(scene.control_dt);
+  asked.clear();
   panel.fill(scene.policies);
   if (!view) begin();
   link.send({ type: "begin" });
