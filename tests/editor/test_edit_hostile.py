@@ -127,7 +127,7 @@ def wait_until_empty(site) -> None:
 
 def test_a_page_too_many_is_sent_away_until_another_leaves(site, monkeypatch):
     wait_until_empty(site)
-    monkeypatch.setattr(server, "_MAX_PAGES", 1)
+    monkeypatch.setattr(server.App, "most_pages", 1)
     with socket(site) as first:
         first.recv(timeout=10)
         with socket(site) as second, pytest.raises(ConnectionClosed) as caught:
