@@ -65,7 +65,7 @@ def as_process_1(monkeypatch, change: int) -> None:
     ],
 )
 def test_processes_must_agree(monkeypatch, tmp_path, change, error, text):
-    prepare(tmp_path, CONFIG, False, print)
+    prepare(tmp_path, CONFIG, False, print).close()
     spread.check_shared(CONFIG, tmp_path)
     as_process_1(monkeypatch, change)
     with pytest.raises(error, match=text):

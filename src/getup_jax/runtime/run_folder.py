@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shlex
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from getup_jax.config import Config, ConfigError
 from getup_jax.config.load import dump_yaml, load_saved_config, to_dict
 
+with contextlib.suppress(ImportError):  # Windows has none
+    import fcntl
+
 CONFIG = "config.yaml"
+_LOCK = ".lock"  # held by the process that trains; free again however that ends
 
 
 class RunError(ValueError):
@@ -25,15 +30,53 @@ def check(folder: Path, resume: bool) -> None:
     """
     if folder.exists() and not folder.is_dir():
         raise RunError(f"{folder}: is a file; choose another folder with --run FOLDER")
-    if not resume and folder.is_dir() and any(path.name != CONFIG for path in folder.iterdir()):
+    if not resume and folder.is_dir() and _holds_a_run(folder):
         hint = "add --resume to continue it, or choose another folder with --run FOLDER"
         raise RunError(f"{folder}: holds a run already; {hint}")
 
 
-def prepare(folder: Path, config: Config, resume: bool, log: Callable[[str], None]) -> None:
-    """Make the folder and write the resolved config; log the settings that a resume changes."""
+def _holds_a_run(folder: Path) -> bool:
+    return any(path.name not in (CONFIG, _LOCK) for path in folder.iterdir())
+
+
+def prepare(folder: Path, config: Config, resume: bool, log: Callable[[str], None]) -> IO[str]:
+    """Make the folder and write the resolved config; log the settings that a resume changes.
+
+    Returns a file: until it is closed, the folder is this process's alone, and RunError is raised
+    in others.
+    """
     check(folder, resume)
     folder.mkdir(parents=True, exist_ok=True)
+    held = _locked(folder)
+    try:
+        _write_config(folder, config, resume, log)
+    except BaseException:
+        held.close()
+        raise
+    return held
+
+
+def _locked(folder: Path) -> IO[str]:
+    file = open(folder / _LOCK, "a+", encoding="utf-8")  # noqa: SIM115  # closed by who holds it
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.seek(0)
+        with file:
+            process = file.read().strip() or "unknown"
+        raise RunError(
+            f"{folder}: another training writes into it (process {process}); stop that one first, "
+            "or choose another folder with --run FOLDER"
+        ) from None
+    except (OSError, NameError):
+        return file  # a file system, or a system, without such locks
+    file.truncate(0)
+    file.write(str(os.getpid()))
+    file.flush()
+    return file
+
+
+def _write_config(folder: Path, config: Config, resume: bool, log: Callable[[str], None]) -> None:
     file = folder / CONFIG
     if resume and file.exists():
         _log_changes(file, config, log)

@@ -143,8 +143,11 @@ def run(
         processes.lost_is_an_error(),
         Display(total, quiet) as display,
         StopRequest(display.log) as stop,
+        contextlib.ExitStack() as held,
     ):
-        processes.first_alone(lambda: prepare(folder, config, resume, display.log))
+        processes.first_alone(
+            lambda: held.enter_context(prepare(folder, config, resume, display.log))
+        )
         check_shared(config, folder)
         if _finished(folder, config):
             display.log(f"{folder} has all of its {count(total)} steps; raise train.total_steps")
