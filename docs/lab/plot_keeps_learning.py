@@ -28,7 +28,7 @@ def main() -> None:
         axis.plot(*zip(*points, strict=True), label=f"{policy}, now")
     axis.set(xlabel="million samples more", ylabel="mean total reward, with noise")
     axis.grid(alpha=0.3)
-    axis.legend(fontsize=8)
+    axis.legend(fontsize=8, loc="center right")
     figure.tight_layout()
     figure.savefig(FOLDER / "keeps_learning.png", dpi=110)
 
