@@ -109,6 +109,7 @@ def test_balls_are_put_where_the_engine_puts_them():
         BatchLoop(engine.model, physics, moved).checked()
 
 
+@pytest.mark.slow
 def test_an_engine_of_jax_is_recorded_and_scanned(learner_and_world):
     """Any engine is one of JAX as far as the scan can see."""
     learner, world = learner_and_world

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 
@@ -14,6 +16,7 @@ class FakeWriter:
 
     def get_writer(self, path, **settings):
         self.settings = settings
+        Path(path).touch()  # a film is written beside its place, and then takes it
         return self
 
     def append_data(self, image) -> None:

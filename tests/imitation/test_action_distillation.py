@@ -295,6 +295,7 @@ LONGER = dataclasses.replace(
 )
 
 
+@pytest.mark.slow
 def test_other_sizes_that_see_more_of_the_curve_are_distilled_into(tmp_path, task, monkeypatch):
     quickly(monkeypatch, rounds=2)
     loaded = loaded_from(tmp_path, task, CONFIG)

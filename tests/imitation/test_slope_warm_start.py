@@ -45,6 +45,7 @@ def test_held_poses_are_those_of_the_starts_and_stand(built):
     np.testing.assert_allclose(gap, 0.0, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_actor_learns_the_held_poses_and_keeps_the_rest(built, monkeypatch):
     monkeypatch.setattr(action_regression, "_MINIBATCH", 64)
     monkeypatch.setattr(slope_warm_start, "_HELD", 3)

@@ -95,6 +95,7 @@ def test_the_search_follows_a_curve_more_closely_than_a_policy_that_knows_nothin
     assert missed[0] < 0.7 * missed[1]
 
 
+@pytest.mark.slow
 def test_the_bound_of_edits(built):
     network = NetworkConfig(hidden_sizes=(8,))
     learner = make_learner(built.environment, network, PPOConfig(), total_steps=1000)

@@ -37,7 +37,7 @@ def test_devices_that_do_not_divide(launch, tmp_path):
     assert expected + "ppo.num_envs=18" in one_line(ended.err)
 
 
-@pytest.mark.parametrize("kind", ["settings", "folder"])
+@pytest.mark.parametrize("kind", ["settings", pytest.param("folder", marks=pytest.mark.slow)])
 def test_processes_that_are_not_one_run(launch, tmp_path, kind):
     address = f"127.0.0.1:{free_port()}"
     both = ["--coordinator", address, "--processes", "2", "--process"]
