@@ -27,8 +27,9 @@ from getup_jax.config import Config, ConfigError
 from getup_jax.config.load import load_config as _load_config
 from getup_jax.core.resources import DEFAULT_POLICY
 from getup_jax.core.types import StepOutput
-from getup_jax.envs.composite.goals.combine import register_goal
-from getup_jax.envs.composite.goals.goal import Goal, GoalOutput
+from getup_jax.envs.composite.goals.combine import register_goal as register_goal
+from getup_jax.envs.composite.goals.goal import Goal as Goal
+from getup_jax.envs.composite.goals.goal import GoalOutput as GoalOutput
 from getup_jax.envs.getup.build import build_task
 from getup_jax.envs.getup.user_rewards import REWARDS, RewardTerm
 from getup_jax.evaluation import composite_rollout, driver, getup
@@ -41,21 +42,6 @@ from getup_jax.pose_prior.prior import PosePrior
 from getup_jax.runtime import checkpoint
 from getup_jax.runtime.console import Display
 from getup_jax.training import run as _run
-
-__all__ = [
-    "Env",
-    "Goal",
-    "GoalOutput",
-    "Policy",
-    "Scenario",
-    "evaluate",
-    "load_config",
-    "load_policy",
-    "make_env",
-    "register_goal",
-    "register_reward",
-    "train",
-]
 
 Log = Callable[[str], None]
 

@@ -177,10 +177,15 @@ def find_checkpoints(path: str | Path) -> list[Path]:
     return found
 
 
+def shipped_policies() -> list[str]:
+    """The names of the shipped policies, sorted."""
+    folder = asset_path(CHECKPOINTS)
+    return sorted(p.name for p in folder.iterdir() if p.is_dir()) if folder.is_dir() else []
+
+
 def _shipped_hint() -> str:
     """What to do when a path is not there."""
-    shipped = asset_path(CHECKPOINTS)
-    names = sorted(p.name for p in shipped.iterdir() if p.is_dir()) if shipped.is_dir() else []
+    names = shipped_policies()
     known = f"shipped policies: {', '.join(names)}" if names else "no policy is shipped yet"
     return (
         f"; {known}; give a run folder or a checkpoint in one, such as what "

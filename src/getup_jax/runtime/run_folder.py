@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shlex
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
 from getup_jax.config import Config, ConfigError
 from getup_jax.config.load import dump_yaml, load_saved_config, to_dict
-
-with contextlib.suppress(ImportError):  # Windows has none
-    import fcntl
 
 CONFIG = "config.yaml"
 _LOCK = ".lock"  # held by the process that trains; free again however that ends
@@ -58,6 +55,10 @@ def prepare(folder: Path, config: Config, resume: bool, log: Callable[[str], Non
 
 def _locked(folder: Path) -> IO[str]:
     file = open(folder / _LOCK, "a+", encoding="utf-8")  # noqa: SIM115  # closed by who holds it
+    if sys.platform == "win32":  # which has no such locks
+        return file
+    import fcntl
+
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -68,8 +69,8 @@ def _locked(folder: Path) -> IO[str]:
             f"{folder}: another training writes into it (process {process}); stop that one first, "
             "or choose another folder with --run FOLDER"
         ) from None
-    except (OSError, NameError):
-        return file  # a file system, or a system, without such locks
+    except OSError:
+        return file  # a file system without such locks
     file.truncate(0)
     file.write(str(os.getpid()))
     file.flush()

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from getup_jax.config import Config, ConfigError, PhysicsConfig
-from getup_jax.core.resources import asset_path
 from getup_jax.editor.steer.character import Character
 from getup_jax.editor.steer.recovery import GetUp
 from getup_jax.envs.composite.goals.combine import GOALS, equipment_of
@@ -18,7 +17,7 @@ from getup_jax.evaluation.composite import evaluation_config
 from getup_jax.evaluation.scenario import Scenario
 from getup_jax.evaluation.steering import Player, check_alike, check_physics, player_of
 from getup_jax.physics.character import load_character
-from getup_jax.runtime.checkpoint import CHECKPOINTS, LoadedPolicy, load_policy
+from getup_jax.runtime.checkpoint import LoadedPolicy, load_policy, shipped_policies
 from getup_jax.training.run import Log
 
 _POOL = 64  # start states; a training wants many, a character begins now and then
@@ -110,7 +109,8 @@ def choose(first: str, loaded: LoadedPolicy, others: Sequence[str], getup: str |
     rising = None if getup is None else load_policy(getup)
     if rising is not None:
         _check_getup(rising, config, f"--getup {getup}")
-    for name, other in _shipped():
+    for name in shipped_policies():
+        other = load_policy(name)
         if rising is None and _fits(lambda other=other: _check_getup(other, config, "")):
             rising = other
         known = {offer.loaded.path for offer in offers.values()}
@@ -154,12 +154,6 @@ def _fits(check: Any) -> bool:
     except ConfigError:
         return False
     return True
-
-
-def _shipped() -> list[tuple[str, LoadedPolicy]]:
-    folder = asset_path(CHECKPOINTS)
-    names = sorted(p.name for p in folder.iterdir() if p.is_dir()) if folder.is_dir() else []
-    return [(name, load_policy(name)) for name in names]
 
 
 def _live(config: Config) -> Config:
