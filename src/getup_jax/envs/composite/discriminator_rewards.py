@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from getup_jax.config import CompositeConfig
 from getup_jax.core import device_axis
 from getup_jax.envs.composite.groups import Group, objective_weights
-from getup_jax.envs.composite.reference_windows import sample
+from getup_jax.envs.composite.reference_windows import likeness, sample
 from getup_jax.envs.composite.task import CompositeTask
 from getup_jax.rl.discriminator import Discriminator, DiscriminatorState
 from getup_jax.rl.rollout import Transition
@@ -68,6 +68,9 @@ class DiscriminatorRewards:
             rewards = rewards.at[..., index].set(imitation)
             trained[group.name] = state
             metrics |= {f"discriminator_{group.name}/{k}": v for k, v in found.items()}
+            # of a rollout's last step alone: a distance to hundreds of poses is not cheap
+            alike = likeness(references, group, windows[-1])
+            metrics |= {f"rollout/{k}": device_axis.mean(v) for k, v in alike.items()}
         for index, name in enumerate(self.names):
             metrics[f"rollout/reward_{name}"] = device_axis.mean(rewards[..., index])
         return trained, dataclasses.replace(transition, reward=self._merged(rewards)), metrics

@@ -102,6 +102,18 @@ def window_at(
     return group.window(position, _turn_between(references.quaternion, row, share))
 
 
+def likeness(references: References, group: Group, windows: jax.Array) -> dict[str, jax.Array]:
+    """Distance [B] of windows [B, F, D] to the nearest pose of the clips (m), and their travel [B].
+
+    The latter is a share of what the clips do. A character that stands still in one of their poses
+    has no distance, and no travel.
+    """
+    return {
+        f"pose_gap_{group.name}_m": nearest(references, group, windows),
+        f"travel_{group.name}": travel(group, windows) / jnp.maximum(references.travel, 1e-6),
+    }
+
+
 def nearest(references: References, group: Group, window: jax.Array) -> jax.Array:
     """Mean distance [B] (m) of a window's newest links to the nearest pose of the clips.
 

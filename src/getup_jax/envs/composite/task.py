@@ -21,7 +21,7 @@ from getup_jax.envs.composite.goals.combine import Goals
 from getup_jax.envs.composite.goals.goal import GoalOutput
 from getup_jax.envs.composite.groups import Group
 from getup_jax.envs.composite.link_frames import FRAMES, LINK_STATE, link_state, observe
-from getup_jax.envs.composite.reference_windows import References, nearest, travel
+from getup_jax.envs.composite.reference_windows import References
 from getup_jax.physics.character import CharacterSpec
 
 _RESET_CHUNK = 32
@@ -166,11 +166,9 @@ class CompositeTask:
             key=key,
             **_count(state, goal_outputs),
         )
-        return state, self._output(world, state, goal_outputs)
+        return state, self._output(state, goal_outputs)
 
-    def _output(
-        self, world: CompositeWorld, state: CompositeState, goals: tuple[GoalOutput, ...]
-    ) -> StepOutput:
+    def _output(self, state: CompositeState, goals: tuple[GoalOutput, ...]) -> StepOutput:
         """What a step returns; the imitation rewards are 0 until a discriminator gives them."""
         kinematics = state.physics.kinematics
         causes = {
@@ -184,7 +182,6 @@ class CompositeTask:
         rewards = [none for _ in self.groups] + [goal.reward for goal in goals]
         reward = jnp.stack(rewards, axis=-1)
         last = round(self.config.episode_s / self.engine.control_dt)
-        windows = self.windows(state.history)
         return StepOutput(
             observation=state.observation,
             final_observation=state.observation,
@@ -193,9 +190,9 @@ class CompositeTask:
             truncated=~terminated & (state.step >= last),
             terms={},
             ended=causes,
-            metrics=self._likeness(world, windows),
+            metrics={},
             episode={"steps": state.step.astype(jnp.float32)} | self.success(state),
-            extras=windows,
+            extras=self.windows(state.history),
         )
 
     def kinematics(self, state: CompositeState) -> Kinematics:
@@ -248,22 +245,6 @@ class CompositeTask:
         links = jnp.asarray([i for i, name in enumerate(names) if not name.startswith("foot")])
         height = kinematics.link_position[:, links, 2]
         return jnp.min(height, axis=-1) < self.config.fall_height_m
-
-    def _likeness(
-        self, world: CompositeWorld, windows: dict[str, jax.Array]
-    ) -> dict[str, jax.Array]:
-        """Of every group: distance to the nearest pose of its clips (m), and how far it moves.
-
-        The latter as a share of what the clips do. A character that stands still in one of their
-        poses has no distance, and no travel.
-        """
-        found = {}
-        for group in self.groups:
-            references, window = world.references[group.name], windows[group.name]
-            found[f"pose_gap_{group.name}_m"] = nearest(references, group, window)
-            share = travel(group, window) / jnp.maximum(references.travel, 1e-6)
-            found[f"travel_{group.name}"] = share
-        return found
 
     def _draw(self, world: CompositeWorld, key: jax.Array, num_envs: int) -> jax.Array:
         return jax.random.randint(key, (num_envs,), 0, len(world.starts.history))
