@@ -59,6 +59,9 @@ class CurriculumConfig:
     track_weight: float = number(0.0, least=0, most=1000)
     # exponent on the height and orientation terms in it
     track_sharpness: float = number(3.0, above=0, most=100)
+    # that of the height term, if another: an error of .05 m costs half of what one of .1 rad does;
+    # None: track_sharpness
+    track_height_sharpness: float | None = number(None, above=0, most=100)
     # of its returns: how a curve is followed shows at once, whether one stands only at the end;
     # None: ppo.discount
     track_discount: float | None = number(None, least=0, below=1)

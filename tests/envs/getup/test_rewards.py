@@ -111,6 +111,9 @@ def test_tracking_10_cm_and_2_tenths_off_in_both_angles():
     )  # fmt: skip
     assert float(rewards.tracking(found, 3.0)) == pytest.approx(math.exp(-3 * 0.77), rel=1e-5)
     np.testing.assert_allclose(rewards.tracking(found, 1.0), found["task"], rtol=1e-5)
+    # the height twice as sharp: exp(-3 (2 * 1.7 * 0.1 + 1.5 (0.2 + 0.2)))
+    sharper = float(rewards.tracking(found, 3.0, of_height=6.0))
+    assert sharper == pytest.approx(math.exp(-3 * 0.94), rel=1e-5)
 
 
 def test_sharpness_is_an_exponent_on_the_tracking_and_not_on_the_rest():

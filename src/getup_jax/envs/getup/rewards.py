@@ -56,9 +56,16 @@ def task(terms: dict[str, jax.Array]) -> jax.Array:
     return terms["height"] * terms["orientation"] * terms["velocity"] * terms["posture"]
 
 
-def tracking(terms: dict[str, jax.Array], sharpness: float) -> jax.Array:
-    """(r_h r_theta)^k = exp(-k (1.7 |dh| + 1.5 |dtheta_x| + 1.5 |dtheta_z|)); k = sharpness."""
-    return (terms["height"] * terms["orientation"]) ** sharpness
+def tracking(
+    terms: dict[str, jax.Array], sharpness: float, of_height: float | None = None
+) -> jax.Array:
+    """r_h^n r_theta^k = exp(-1.7 n |dh| - 1.5 k (|dtheta_x| + |dtheta_z|)).
+
+    k is the sharpness, n that of the height; None: k, too.
+    """
+    if of_height is None or of_height == sharpness:
+        return (terms["height"] * terms["orientation"]) ** sharpness
+    return terms["height"] ** of_height * terms["orientation"] ** sharpness
 
 
 def sharpened(terms: dict[str, jax.Array], sharpness: float) -> jax.Array:

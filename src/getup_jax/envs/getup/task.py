@@ -275,7 +275,8 @@ class GetUpTask:
         terms = rewards.terms(posture.features, target, end, omega, joint_error)
         terms["total"] = rewards.sharpened(terms, curriculum.reward_sharpness)
         if curriculum.track_weight > 0:
-            terms["track"] = rewards.tracking(terms, curriculum.track_sharpness)
+            sharpness, of_height = curriculum.track_sharpness, curriculum.track_height_sharpness
+            terms["track"] = rewards.tracking(terms, sharpness, of_height)
         if world.prior is None:  # nothing that offsets could be unnatural to [P 6.4]
             return terms
         terms["natural"] = rewards.natural(self._offset(state), config.offset_limit_rad)

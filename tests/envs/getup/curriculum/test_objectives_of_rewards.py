@@ -111,6 +111,10 @@ def test_without_a_pose_prior_no_term_is_natural(built):
     [
         ({"reward_sharpness": 0.0}, r"curriculum\.reward_sharpness: expected a number more than 0"),
         ({"track_sharpness": -1.0}, r"curriculum\.track_sharpness: expected a number more than 0"),
+        (
+            {"track_height_sharpness": 0.0},
+            r"curriculum\.track_height_sharpness: expected a number more than 0",
+        ),
         ({"objectives": "all"}, r"curriculum\.objectives: expected one of .*'terms'.*, got 'all'"),
         (
             {"track_weight": -0.1},
