@@ -112,6 +112,41 @@ def test_escape_takes_a_drag_back_and_keys_work_wherever_the_focus_is(page_serve
         assert value(page, HEIGHT, 4) == old
 
 
+def test_a_drag_that_is_taken_back_does_not_go_on(page_server):
+    """Of a point by undo, and of a slider by Escape, while the button is still held."""
+    with opened(page_server[0]) as page:
+        old, seconds = value(page, HEIGHT, 4), page.input_value("#seconds")
+        point = page.locator(f'[aria-label="{HEIGHT}"] [data-point="4"]').bounding_box()
+        x, y = point["x"] + 6, point["y"] + 6
+        press(page, (x, y), (x, y - 40))
+        assert value(page, HEIGHT, 4) > old
+        page.keyboard.press("Control+z")
+        page.mouse.move(x, y - 45)
+        page.mouse.up()
+        assert value(page, HEIGHT, 4) == old
+        for slider in ("#duration", "#shift"):
+            box = page.locator(slider).bounding_box()
+            y = box["y"] + box["height"] / 2
+            x = [box["x"] + share * box["width"] for share in (0.3, 0.6, 0.65)]
+            press(page, (x[0], y), (x[1], y))
+            assert page.is_enabled("#undo"), slider
+            page.keyboard.press("Escape")
+            page.mouse.move(x[2], y)
+            page.mouse.up()
+            drawn(page)
+            assert page.is_disabled("#undo"), slider
+            assert (page.input_value("#seconds"), page.input_value("#shift")) == (seconds, "0")
+        edited(page, lambda: page.locator("#duration").press("ArrowRight"))
+        assert page.input_value("#seconds") != seconds
+
+
+def press(page, begin, end) -> None:
+    """Drag, and keep the button down."""
+    page.mouse.move(*begin)
+    page.mouse.down()
+    page.mouse.move(*end, steps=4)
+
+
 @pytest.mark.parametrize("size", [(1024, 768), (1920, 1080), (390, 844)])
 def test_nothing_is_outside_of_the_window(page_server, size):
     viewport = {"width": size[0], "height": size[1]}

@@ -26,19 +26,30 @@ export class Controls {
     region.addEventListener("change", () => store.commit((now) => ({ ...now, region: Number(region.value) })));
     // a field that is left empty goes back to what it was
     place.addEventListener("change", () => (place.value === "" ? this.show() : this.place(Number(place.value))));
-    slider.addEventListener("input", () => store.live((now) => edits.last(now, Number(slider.value))));
-    slider.addEventListener("change", () => store.commit(null, { tag: "duration" }));
     seconds.addEventListener("change", () => (seconds.value === "" ? this.show() : this.last(Number(seconds.value))));
-    shift.addEventListener("input", () => store.live((now) => edits.shift(now, Number(shift.value))));
-    shift.addEventListener("change", () => {
-      shift.value = 0;
-      store.commit();
-    });
+    this.slide(slider, edits.last, "duration");
+    this.slide(shift, edits.shift);
     this.listenToName(elements.name);
     elements.undo.addEventListener("click", () => store.undo());
     elements.redo.addEventListener("click", () => store.redo());
     elements.reset.addEventListener("click", () => store.commit(edits.reset));
     elements.mirror.addEventListener("click", () => store.commit((now) => edits.mirror(now, this.scene.mirrored, this.scene.mirror)));
+  }
+
+  /** A draft follows the slider. One that is taken back, as by Escape or undo, stays so until the slider is let go.
+   * @param {HTMLInputElement} slider @param {(now: import("./types.js").Content, amount: number) => import("./types.js").Content} edit */
+  slide(slider, edit, tag = "") {
+    let begun = false;
+    for (const again of ["pointerdown", "focus"]) slider.addEventListener(again, () => { begun = false; });
+    slider.addEventListener("input", () => {
+      if (begun && !this.store.draft) return this.show();
+      begun = true;
+      this.store.live((now) => edit(now, Number(slider.value)));
+    });
+    slider.addEventListener("change", () => {
+      begun = false;
+      this.store.commit(null, { tag });
+    });
   }
 
   /** What a file's name may not have cannot be typed. @param {HTMLInputElement} name */
@@ -127,6 +138,7 @@ export class Controls {
     const { elements, store } = this, { now, current } = store, seconds = duration(now);
     if (document.activeElement !== elements.name) elements.name.value = now.curve.name;
     elements.duration.value = seconds;
+    if (!store.draft) elements.shift.value = 0;
     if (document.activeElement !== elements.seconds || elements.seconds.value === "") elements.seconds.value = seconds;
     elements.region.value = now.region;
     if (document.activeElement !== elements.place) elements.place.value = now.place + 1;
