@@ -58,6 +58,7 @@ test("what is copied is pasted at another time, and into a curve of another dura
   close(values(pasted).slice(6, 8), clip.height.map((key) => key.value), 1e-3);
   assert.ok(times(pasted, "front_angle").some((t) => Math.abs(t - 0.7625) < 1e-9));
   assert.equal(pasted.curve.side_angle, other.curve.side_angle);
+  assert.deepEqual(selection.pasted(pasted, clip, 0.7), { height: [6, 7], side_angle: [], front_angle: [7] });
   const late = selection.paste(other, clip, 0.99);
   assert.ok(times(late).every((t) => t <= 1));
 });
@@ -66,7 +67,10 @@ test("a box selects the keys in it, and a selection forgets keys that are gone",
   const now = content();
   assert.deepEqual(selection.inside(keysIn(now, "height"), [0.3, 0], [0.7, 2]), [3, 4, 5]);
   assert.deepEqual(selection.inside(keysIn(now, "height"), [0.7, 2], [0.3, 0]), [3, 4, 5]);
-  assert.deepEqual(selection.valid(now, { height: [2, 11] }).height, [2]);
+  const other = selection.remove(now, { height: [1] }), before = selection.lengths(now), picked = { height: [2], side_angle: [3] };
+  assert.deepEqual(selection.valid(now, picked, before), { ...picked, front_angle: [] });
+  // another key is the second one now
+  assert.deepEqual(selection.valid(other, picked, before), { height: [], side_angle: [3], front_angle: [] });
   assert.equal(selection.count({ height: [1, 2], side_angle: [3] }), 3);
   assert.deepEqual(selection.toggled({ height: [1] }, "height", 1).height, []);
 });

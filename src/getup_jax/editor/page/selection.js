@@ -100,6 +100,16 @@ export function paste(now, clip, at) {
   return withKeys(now, changed);
 }
 
+/** The keys that a paste has put there. @param {Content} now @param {Clip} clip @param {number} at @returns {Picked} */
+export function pasted(now, clip, at) {
+  const seconds = now.curve.durations[0];
+  return Object.fromEntries(FEATURES.map((feature) => {
+    const own = (clip[feature] ?? []).map((key) => at + key.time / seconds), room = GAP / 2;
+    const among = (/** @type {Key} */ key) => own.length > 0 && key.time > own[0] - room && key.time < own[own.length - 1] + room;
+    return [feature, keysIn(now, feature).flatMap((key, i) => (among(key) ? [i] : []))];
+  }));
+}
+
 /** The keys of a curve that lie in a box of time (share) and value. @param {Key[]} keys @param {number[]} from @param {number[]} to */
 export function inside(keys, from, to) {
   const between = (/** @type {number} */ x, /** @type {number} */ a, /** @type {number} */ b) => x >= Math.min(a, b) && x <= Math.max(a, b);
@@ -113,7 +123,11 @@ export function toggled(picked, feature, i) {
   return { ...picked, [feature]: changed };
 }
 
-/** What is still there of a selection. @param {Content} now @param {Picked} picked @returns {Picked} */
-export function valid(now, picked) {
-  return Object.fromEntries(FEATURES.map((feature) => [feature, (picked[feature] ?? []).filter((i) => i < keysIn(now, feature).length)]));
+/** How many keys each curve has. @param {Content} now @returns {number[]} */
+export function lengths(now) { return FEATURES.map((feature) => keysIn(now, feature).length); }
+
+/** What is still there of a selection: a curve that has more or fewer keys than before has others at their numbers. @param {Content} now @param {Picked} picked @param {number[]} before lengths when they were selected @returns {Picked} */
+export function valid(now, picked, before) {
+  const there = lengths(now);
+  return Object.fromEntries(FEATURES.map((feature, f) => [feature, there[f] === before[f] ? picked[feature] ?? [] : []]));
 }

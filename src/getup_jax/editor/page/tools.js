@@ -88,9 +88,10 @@ export class Tools {
   }
 
   paste() {
-    const { clip } = this.graph;
-    if (clip) this.store.commit((now) => selection.paste(now, clip, this.at));
-    else say("Nothing is copied yet.");
+    const { clip } = this.graph, { at } = this;
+    if (!clip) return say("Nothing is copied yet.");
+    this.store.commit((now) => selection.paste(now, clip, at));
+    this.graph.select(selection.pasted(this.store.now, clip, at));
   }
 
   all() {
@@ -101,6 +102,7 @@ export class Tools {
     const seconds = clamp(Number($("hold-seconds").value) || 1, 0.1, 10), before = duration(this.store.now), { at } = this;
     $("hold-seconds").value = seconds;
     this.store.commit((now) => edits.hold(now, at, seconds));
+    this.graph.select({}); // other keys are at those numbers now
     const added = duration(this.store.now) - before;
     say(added > 0.05 ? `A pause of ${added.toFixed(1)} s at ${(at * before).toFixed(2)} s` : "The motion is as long as it may be.");
   }
@@ -110,6 +112,7 @@ export class Tools {
     $("stretch-factor").value = factor;
     if (to - from < 0.01) return say("From in to out there is nothing of the curves.");
     this.store.commit((now) => edits.stretch(now, from, to, factor));
+    this.graph.select({});
     this.player.setRange(null);
   }
 
@@ -129,6 +132,7 @@ export class Tools {
     const [from, to] = this.player.range ? this.part : [this.at, this.at];
     const pose = value[0] === "p" ? POSES[Number(value.slice(1))] : undefined;
     this.store.commit((now) => edits.wish(now, from, to, values, pose && { name: pose.name, contacts: pose.contacts }));
+    this.graph.select({});
     say("Height and angles are wished there. What touches the ground is the policy's choice: the report says what was reached.");
   }
 
