@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from browser import (
     BROWSER,
+    FRONT,
     HEIGHT,
     achieved,
     drag,
@@ -12,6 +14,7 @@ from browser import (
     edited,
     judged,
     opened,
+    picture,
     says,
     shown,
     value,
@@ -145,6 +148,26 @@ def press(page, begin, end) -> None:
     page.mouse.move(*begin)
     page.mouse.down()
     page.mouse.move(*end, steps=4)
+
+
+def test_what_is_zoomed_reaches_over_no_numbers(page_server):
+    with opened(page_server[0]) as page:
+        page.click("#play")
+        box = page.locator(f'[aria-label="{HEIGHT}"]').bounding_box()
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        page.mouse.wheel(0, -600)
+        drawn(page)
+        for panel in (HEIGHT, FRONT):
+            numbers = picture(page, f'[aria-label="{panel}"]')[24:-24, 2:26]
+            assert np.ptp(numbers, axis=2).max() < 0.3, "there is a line over the numbers"
+
+
+def test_a_field_that_takes_nothing_looks_like_it(page_server):
+    with opened(page_server[0]) as page:
+        for name in ("key-time", "key-value", "place", "region", "undo"):
+            assert page.is_disabled(f"#{name}")
+            opacity = page.locator(f"#{name}").evaluate("e => getComputedStyle(e).opacity")
+            assert float(opacity) < 0.6, name
 
 
 @pytest.mark.parametrize("size", [(1024, 768), (1920, 1080), (390, 844)])
