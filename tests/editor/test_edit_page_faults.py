@@ -16,6 +16,7 @@ from browser import (
     opened,
     picture,
     says,
+    shot,
     shown,
     value,
 )
@@ -168,6 +169,26 @@ def test_a_field_that_takes_nothing_looks_like_it(page_server):
             assert page.is_disabled(f"#{name}")
             opacity = page.locator(f"#{name}").evaluate("e => getComputedStyle(e).opacity")
             assert float(opacity) < 0.6, name
+
+
+def test_variants_apart_are_all_in_the_picture(page_server):
+    def columns() -> np.ndarray:
+        """Which columns of the view's lower half are of a body: it is in colour, the ground is not."""
+        page.wait_for_timeout(1500)  # the pictures are drawn one after the other
+        view = picture(page, "#view")
+        return (np.ptp(view[len(view) // 4 :], axis=2) > 0.15).any(axis=0)
+
+    with opened(page_server[0]) as page:
+        page.click("#play")
+        for _ in range(3):
+            edited(page, lambda: page.click("text=+ variant"))
+        page.keyboard.press("End")
+        page.check("#apart")
+        seen = columns()
+        shot(page, "apart")
+        assert (np.diff(seen.astype(int)) == 1).sum() == 4
+        assert not seen[:5].any()
+        assert not seen[-5:].any()
 
 
 @pytest.mark.parametrize("size", [(1024, 768), (1920, 1080), (390, 844)])

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { close } from "./samples.js";
-import { cameraAt } from "../../../src/getup_jax/editor/page/camera.js";
+import { asideOf, cameraAt, rowDistance } from "../../../src/getup_jax/editor/page/camera.js";
 import { contacts, reached } from "../../../src/getup_jax/editor/page/contacts.js";
 import { around, pinched, Scale, snapped, timeTicks, within, zoomed } from "../../../src/getup_jax/editor/page/graph_scale.js";
 import { lostRuns } from "../../../src/getup_jax/editor/page/panel_motion.js";
@@ -55,6 +55,15 @@ test("the camera stays above the ground, flat or not, wherever it is turned", ()
       assert.ok(z >= (Math.round(x + 5) > 7 ? 3 : 0) + 0.2);
       assert.ok(cameraAt({ x: 0, y: 0, z: 0.6 }, orbit, null)[2] >= 0.2);
     }
+  }
+});
+
+test("variants side by side are all seen, whichever is edited", () => {
+  const half = Math.tan((19 * Math.PI) / 180) * 1.4; // of a view of 654 x 467
+  for (const count of [2, 3, 4]) {
+    const places = Array.from({ length: count }, (_, i) => asideOf(i, count)), seen = half * rowDistance(count, half);
+    close([places[0] + places[count - 1]], [0]);
+    assert.ok(places.every((place) => Math.abs(place) + 0.9 < seen));
   }
 });
 
