@@ -1,7 +1,7 @@
 // The controls below the curves and in the header; they change the store and follow it.
 
 import { alike } from "./alike.js";
-import { duration, DURATION_S, keptDuration, keptName } from "./content.js";
+import { duration, DURATION_S, keptDuration, keptName, sameCurve } from "./content.js";
 import { group, option } from "./dom.js";
 import * as edits from "./edits.js";
 import { clamp, LIES } from "./features.js";
@@ -106,7 +106,7 @@ export class Controls {
 
   /** @param {string} value */
   choose(value) {
-    const i = Number(value.slice(1)), curve = value[0] === "c" ? this.scene.curves[i] : this.store.project?.imported[i]?.curve;
+    const curve = this.curveOf(value);
     if (curve) this.store.commit((now) => edits.choose(now, curve));
   }
 
@@ -146,14 +146,15 @@ export class Controls {
     elements.redo.disabled = !current.history.future.length;
     this.fillCurves();
     if (!store.draft) this.fillStarts();
-    const chosen = [...elements.curve.options].find((o) => this.named(o.value) === now.reference.name);
+    const named = [...elements.curve.options].filter((o) => this.curveOf(o.value)?.name === now.reference.name);
+    const chosen = named.find((o) => sameCurve(/** @type {Curve} */ (this.curveOf(o.value)), now.reference)) ?? named[0];
     elements.curve.value = chosen ? chosen.value : "";
   }
 
-  /** @param {string} value of an option */
-  named(value) {
+  /** @param {string} value of an option @returns {Curve | undefined} */
+  curveOf(value) {
     const i = Number(value.slice(1));
-    return value[0] === "c" ? this.scene.curves[i].name : value[0] === "i" ? this.store.project?.imported[i].curve.name : null;
+    return value[0] === "c" ? this.scene.curves[i] : value[0] === "i" ? this.store.project?.imported[i]?.curve : undefined;
   }
 
   /** Every start with how far it is from where the curves begin; one that the server does not list as it is. */
