@@ -90,6 +90,10 @@ def test_time_and_value_are_typed_and_read(page_server):
         assert "1.80 s" in label
         page.check("#frames")
         assert page.input_value("#key-time") == "54"
+        page.keyboard.press("Control+a")
+        drawn(page)
+        assert page.is_disabled("#key-value"), "metres and degrees have no value in common"
+        assert page.is_enabled("#key-time")
 
 
 def test_two_fingers_zoom_the_curves_and_not_the_page(page_server):

@@ -166,10 +166,11 @@ export class Tools {
       const found = new Set(keys.map(of));
       return found.size === 1 ? [...found][0] : "";
     };
-    const unit = keys.length && keys.every((k) => k.feature === "height") ? "m" : keys.length ? "°" : "";
+    const kindOf = (/** @type {typeof keys[0]} */ key) => (key.feature === "height" ? "m" : "°"), units = new Set(keys.map(kindOf));
+    const unit = units.size === 1 ? [...units][0] : ""; // metres and degrees have no value in common
     const time = one(({ time: t }) => (graph.frames ? Math.round((t * seconds) / graph.model.controlDt) : Number((t * seconds).toFixed(3))));
     this.put("key-time", time, keys.length);
-    this.put("key-value", one((key) => Number(key.value.toFixed(3))), keys.length);
+    this.put("key-value", one((key) => Number(key.value.toFixed(3))), unit ? keys.length : 0);
     write($("time-unit"), graph.frames ? "frame" : "s");
     write($("value-unit"), unit);
     const kind = one((key) => key.kind), angles = keys.length && keys.every((k) => k.feature !== "height");
