@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { close } from "./samples.js";
 import { asideOf, cameraAt, rowDistance } from "../../../src/getup_jax/editor/page/camera.js";
-import { contacts, reached } from "../../../src/getup_jax/editor/page/contacts.js";
+import { contacts, reached, wordOf } from "../../../src/getup_jax/editor/page/contacts.js";
 import { around, pinched, Scale, snapped, timeTicks, within, zoomed } from "../../../src/getup_jax/editor/page/graph_scale.js";
 import { lostRuns } from "../../../src/getup_jax/editor/page/panel_motion.js";
 
@@ -74,6 +74,12 @@ test("contacts are the links on the ground, turned as they are and on hills", ()
   assert.deepEqual(touching(upright), ["left foot"]);
   assert.deepEqual(touching(lying), []);
   assert.deepEqual(touching(lying, { origin: [-1, -1], step: 1, points: 3, heights: Array(9).fill(0.2) }), ["left foot"]);
+});
+
+test("every part of the body has a word", () => {
+  const limbs = ["shoulder", "arm", "forearm", "hand", "thigh", "shin", "foot"], sides = { l: /^left /, r: /^right / };
+  for (const limb of limbs) for (const [side, word] of Object.entries(sides)) assert.match(wordOf(`${limb}_${side}`), word);
+  assert.deepEqual(["pelvis", "spine_low", "spine_mid", "spine_upper", "neck", "head"].map(wordOf), ["pelvis", "torso", "torso", "torso", "neck", "head"]);
 });
 
 test("of a wished pose one sees which contacts were there for half of the time", () => {
