@@ -202,4 +202,13 @@ def test_nothing_is_outside_of_the_window(page_server, size):
         assert box["y"] + box["height"] <= size[1], "the view is below the fold"
         assert box["height"] > 150
         assert page.locator(".panel").last.bounding_box()["height"] > 80
-        assert int(shown(page)) > 0
+        edited(page, lambda: page.select_option("#start", value="supine_situp_squat"))
+        assert "Too far from the curves" in judged(page)
+        whole = "e => e.scrollHeight <= e.clientHeight && e.getBoundingClientRect().bottom"
+        bottom = page.locator("#verdict").evaluate(whole)
+        edge = page.locator("#report").bounding_box()
+        assert bottom, "the verdict is cut off"
+        assert bottom <= edge["y"] + edge["height"]
+        if size[0] > 900:
+            words, tools = (page.locator(e).bounding_box() for e in ("#toast", "#left"))
+            assert words["x"] > tools["x"] + tools["width"] - 1, "words lie on the tools"
