@@ -202,6 +202,8 @@ def test_nothing_is_outside_of_the_window(page_server, size):
         assert box["y"] + box["height"] <= size[1], "the view is below the fold"
         assert box["height"] > 150
         assert page.locator(".panel").last.bounding_box()["height"] > 80
+        row = page.locator("#tools").bounding_box()["height"] < 40
+        assert row or size[0] < 1900, "a tool has a row of its own"
         edited(page, lambda: page.select_option("#start", value="supine_situp_squat"))
         assert "Too far from the curves" in judged(page)
         whole = "e => e.scrollHeight <= e.clientHeight && e.getBoundingClientRect().bottom"
