@@ -22,7 +22,8 @@ export class Sources extends EventTarget {
   get any() {
     if (!this.store.project) return false;
     const { curve, reference } = this.store.now;
-    return curve.start === reference.start && Boolean(this.own?.recording || this.library.has(reference.name));
+    const same = curve.start === reference.start && JSON.stringify(curve.pose) === JSON.stringify(reference.pose);
+    return same && Boolean(this.own?.recording || this.library.has(reference.name));
   }
 
   /** @returns {Recording | null} */
