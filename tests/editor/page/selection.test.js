@@ -48,6 +48,8 @@ test("deleted keys are gone, but for the ends; kinds and numbers are set for all
   assert.deepEqual([keysIn(flat, "height")[2].kind, keysIn(flat, "front_angle")[3].kind, keysIn(flat, "height")[3].kind], ["flat", "flat", "auto"]);
   const typed = selection.place(now, { height: [4] }, { time: 0.55, value: 0.8 });
   assert.deepEqual([times(typed)[4], values(typed)[4]], [0.55, 0.8]);
+  const several = selection.place(now, { height: [4, 5], front_angle: [3] }, { time: 0.45 });
+  close([...times(several).slice(4, 6), times(several, "front_angle")[3]], [0.45, 0.575, 0.45]);
 });
 
 test("what is copied is pasted at another time, and into a curve of another duration", () => {

@@ -63,10 +63,11 @@ export function remove(now, picked) {
   return each(now, picked, (keys, chosen) => keys.filter((_, i) => i === 0 || i === keys.length - 1 || !chosen.includes(i)));
 }
 
-/** The number typed: one time (share) or value for all that are selected. @param {Content} now @param {Picked} picked @param {{ time?: number, value?: number }} typed */
+/** The number typed: one value for all that are selected, or the time (share) of the first of each curve, which the others go with. @param {Content} now @param {Picked} picked @param {{ time?: number, value?: number }} typed */
 export function place(now, picked, { time, value }) {
   return each(now, picked, (keys, chosen) => {
-    const moved = time === undefined ? keys.map((key) => key.time) : times(keys, chosen, () => time);
+    const first = keys[chosen.find((i) => i > 0) ?? 0], to = (/** @type {Key} */ key) => key.time + (time ?? 0) - first.time;
+    const moved = time === undefined ? keys.map((key) => key.time) : times(keys, chosen, to);
     return keys.map((key, i) => (chosen.includes(i) ? { ...key, time: moved[i], value: value ?? key.value } : key));
   });
 }
