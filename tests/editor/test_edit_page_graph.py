@@ -12,6 +12,7 @@ from browser import (
     BROWSER,
     FRONT,
     HEIGHT,
+    SIDE,
     achieved,
     drag,
     drawn,
@@ -72,6 +73,18 @@ def test_points_are_added_selected_scaled_copied_and_deleted(page_server):
         page.click("#pass-linear")
         shot(page, "graph")
         assert page.locator('.point[data-kind="linear"]').count() >= 3
+
+
+def test_what_is_copied_from_one_angle_is_pasted_into_the_other(page_server):
+    with opened(page_server[0]) as page:
+        page.locator(f'[aria-label="{FRONT}"] [data-point="3"]').click()
+        page.click("#key-copy")
+        seek(page, 1.7)
+        page.locator(f'[aria-label="{SIDE}"] [data-point="4"]').click()
+        edited(page, lambda: page.click("#key-paste"))
+        (pasted,) = page.locator(f'[aria-label="{SIDE}"] .point.picked').all()
+        found = float(pasted.get_attribute("aria-valuenow"))
+        assert found == pytest.approx(value(page, FRONT, 3), abs=0.06)  # a tenth of a degree
 
 
 def test_time_and_value_are_typed_and_read(page_server):

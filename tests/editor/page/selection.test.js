@@ -65,6 +65,12 @@ test("what is copied is pasted at another time, and into a curve of another dura
   assert.ok(times(late).every((t) => t <= 1));
 });
 
+test("what is copied from one angle goes to the curve whose keys are selected", () => {
+  const clip = selection.copy(content(), { front_angle: [3, 4] });
+  assert.deepEqual(selection.onto(clip, { side_angle: [2] }), { side_angle: clip.front_angle });
+  for (const picked of [{}, { front_angle: [3] }, { height: [3] }, { side_angle: [2], front_angle: [3] }]) assert.deepEqual(selection.onto(clip, picked), clip);
+});
+
 test("a box selects the keys in it, and a selection forgets keys that are gone", () => {
   const now = content();
   assert.deepEqual(selection.inside(keysIn(now, "height"), [0.3, 0], [0.7, 2]), [3, 4, 5]);

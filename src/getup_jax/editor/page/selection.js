@@ -84,6 +84,13 @@ export function copy(now, picked) {
   return clip;
 }
 
+/** A clip of one curve for the curve whose keys are selected alone, where both are angles. @param {Clip} clip @param {Picked} picked @returns {Clip} */
+export function onto(clip, picked) {
+  const from = FEATURES.filter((feature) => clip[feature]?.length), to = FEATURES.filter((feature) => picked[feature]?.length);
+  if (from.length !== 1 || to.length !== 1 || [from[0], to[0]].includes("height")) return clip;
+  return { [to[0]]: clip[from[0]] };
+}
+
 /** A clip from a time (share) on; what lay in its place goes, and so does what reaches past the end. @param {Content} now @param {Clip} clip @param {number} at */
 export function paste(now, clip, at) {
   const seconds = now.curve.durations[0];

@@ -33,7 +33,7 @@ export class Tools {
       el("label", { title: "Of the selected keys" }, number("key-time", "Time of the keys", (t) => this.time(t)), el("span", { id: "time-unit" }, "s")),
       el("label", { title: "Of the selected keys" }, number("key-value", "Value of the keys", (v) => this.value(v)), el("span", { id: "value-unit" }, "m")),
       button("key-delete", "Delete", "The selected keys (Del)", () => this.remove()),
-      el("span", { class: "pair" }, button("key-copy", "Copy", "Ctrl+C", () => this.copy()), button("key-paste", "Paste", "At the time at hand, in this or another variant (Ctrl+V)", () => this.paste())),
+      el("span", { class: "pair" }, button("key-copy", "Copy", "Ctrl+C", () => this.copy()), button("key-paste", "Paste", "At the time at hand, in this or another variant; from one angle's curve also into that of the selected key (Ctrl+V)", () => this.paste())),
       el("span", { class: "pair" }, button("hold", "Hold", "A pause at the time at hand; everything after it comes later (H)", () => this.hold()), number("hold-seconds", "Seconds of a pause", () => {})),
       el("span", { class: "pair" }, button("stretch", "Stretch ×", "The part from in to out, or all of it, takes so many times as long", () => this.stretch()), number("stretch-factor", "Times as long", () => {})),
       el("select", { id: "pose", "aria-label": "Pose", title: "A pose from in to out, or at the time at hand: its height and angles become the curves there", onchange: () => this.pose() }),
@@ -88,8 +88,8 @@ export class Tools {
   }
 
   paste() {
-    const { clip } = this.graph, { at } = this;
-    if (!clip) return say("Nothing is copied yet.");
+    if (!this.graph.clip) return say("Nothing is copied yet.");
+    const { at } = this, clip = selection.onto(this.graph.clip, this.picked);
     this.store.commit((now) => selection.paste(now, clip, at));
     this.graph.select(selection.pasted(this.store.now, clip, at));
   }
