@@ -20,6 +20,7 @@ from browser import (
     judged,
     opened,
     saved,
+    says,
     shot,
     slowdown,
     value,
@@ -85,6 +86,21 @@ def test_what_is_copied_from_one_angle_is_pasted_into_the_other(page_server):
         (pasted,) = page.locator(f'[aria-label="{SIDE}"] .point.picked').all()
         found = float(pasted.get_attribute("aria-valuenow"))
         assert found == pytest.approx(value(page, FRONT, 3), abs=0.06)  # a tenth of a degree
+
+
+def test_a_frame_of_the_source_is_a_pose_to_wish_for(page_server):
+    with opened(page_server[0]) as page:
+        page.click("#play")
+        old = value(page, HEIGHT, 4)
+        edited(page, lambda: drag(page, HEIGHT, 4, 40))
+        seek(page, 1.7)
+        pose = "as its source is at the time at hand"
+        page.select_option("#pose", label=pose)
+        says(page, "toast", "Show the Source first")
+        page.check("#source")
+        page.wait_for_selector(".recorded")
+        edited(page, lambda: page.select_option("#pose", label=pose))
+        assert value(page, HEIGHT, 4) == pytest.approx(old, abs=0.08)
 
 
 def test_time_and_value_are_typed_and_read(page_server):

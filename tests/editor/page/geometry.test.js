@@ -5,6 +5,7 @@ import { close } from "./samples.js";
 import { asideOf, cameraAt, rowDistance } from "../../../src/getup_jax/editor/page/camera.js";
 import { contacts, reached, wordOf } from "../../../src/getup_jax/editor/page/contacts.js";
 import { around, pinched, Scale, snapped, timeTicks, within, zoomed } from "../../../src/getup_jax/editor/page/graph_scale.js";
+import { featuresAt } from "../../../src/getup_jax/editor/page/motion_recording.js";
 import { lostRuns } from "../../../src/getup_jax/editor/page/panel_motion.js";
 
 test("a scale turns places into times and values, and back", () => {
@@ -74,6 +75,11 @@ test("contacts are the links on the ground, turned as they are and on hills", ()
   assert.deepEqual(touching(upright), ["left foot"]);
   assert.deepEqual(touching(lying), []);
   assert.deepEqual(touching(lying, { origin: [-1, -1], step: 1, points: 3, heights: Array(9).fill(0.2) }), ["left foot"]);
+});
+
+test("a recording has height and angles at a share of its time", () => {
+  const frames = Float32Array.from({ length: 3 * 10 }, (_, i) => i);
+  assert.deepEqual([0, 0.4, 1].map((share) => [...featuresAt({ fps: 30, total: 3, links: 1, frames }, share)]), [[7, 8, 9], [17, 18, 19], [27, 28, 29]]);
 });
 
 test("every part of the body has a word", () => {

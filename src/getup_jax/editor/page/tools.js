@@ -5,6 +5,7 @@ import { duration, keysIn } from "./content.js";
 import { $, el, group, option, write } from "./dom.js";
 import * as edits from "./edits.js";
 import { clamp, KINDS } from "./features.js";
+import { featuresAt } from "./motion_recording.js";
 import { say } from "./notice.js";
 import { POSES } from "./poses.js";
 import * as selection from "./selection.js";
@@ -120,7 +121,7 @@ export class Tools {
   fillPoses(scene) {
     const starts = scene.starts.map((/** @type {any} */ s, /** @type {number} */ i) => option(`s${i}`, s.name));
     const poses = POSES.map(({ name }, i) => option(`p${i}`, name));
-    $("pose").replaceChildren(option("", "Pose…"), group("poses", poses), group("this motion", [option("now", "as the body is at the time at hand")]), group("lying as", starts));
+    $("pose").replaceChildren(option("", "Pose…"), group("poses", poses), group("this motion", [option("now", "as the body is at the time at hand"), option("source", "as its source is at the time at hand")]), group("lying as", starts));
     this.scene = scene;
   }
 
@@ -145,9 +146,18 @@ export class Tools {
       const frame = this.player.frame(motion, this.graph.model.controlDt);
       return Object.fromEntries(FEATURES.map((f, i) => [f, motion.features[i][frame]]));
     }
+    if (value === "source") return this.sourceValues();
     if (value[0] !== "s") return null;
     const { first } = this.scene.starts[Number(value.slice(1))];
     return Object.fromEntries(FEATURES.map((f, i) => [f, first[i]]));
+  }
+
+  /** Of the motion that the curve was made from, at the time at hand. @returns {Partial<Record<Feature, number>> | null} */
+  sourceValues() {
+    const recording = this.graph.model.recording();
+    if (!recording) say("Show the Source first: the motion that this curve was made from.");
+    const found = recording && featuresAt(recording, this.at);
+    return found && Object.fromEntries(FEATURES.map((f, i) => [f, found[i]]));
   }
 
   /** @param {boolean} on */
