@@ -17,7 +17,6 @@ from browser import (
     picture,
     says,
     shot,
-    shown,
     value,
 )
 
@@ -173,7 +172,7 @@ def test_a_field_that_takes_nothing_looks_like_it(page_server):
 
 def test_variants_apart_are_all_in_the_picture(page_server):
     def columns() -> np.ndarray:
-        """Which columns of the view's lower half are of a body: it is in colour, the ground is not."""
+        """Which columns of the view are of a body: it is in colour, the ground is not."""
         page.wait_for_timeout(1500)  # the pictures are drawn one after the other
         view = picture(page, "#view")
         return (np.ptp(view[len(view) // 4 :], axis=2) > 0.15).any(axis=0)
