@@ -116,7 +116,7 @@ def test_time_and_value_are_typed_and_read(page_server):
         label = page.locator(f'[aria-label="{HEIGHT}"] [data-point="4"]').get_attribute(
             "aria-label"
         )
-        assert "1.80 s" in label
+        assert "point 5 of 9, 1.80 s" in label  # as the help and the documents call it
         page.check("#frames")
         assert page.input_value("#key-time") == "54"
         page.keyboard.press("Control+a")

@@ -166,7 +166,7 @@ export class Panel {
       const at = key.time * seconds;
       set(dot, {
         cx: scale.x(at), cy: scale.y(key.value), "data-kind": key.kind, "aria-selected": chosen.includes(i),
-        "aria-label": `${kind.title}, key ${i + 1} of ${keys.length}, ${at.toFixed(2)} s, ${key.kind}`, "aria-valuetext": `${key.value} ${kind.unit}`,
+        "aria-label": `${kind.title}, point ${i + 1} of ${keys.length}, ${at.toFixed(2)} s, ${key.kind}`, "aria-valuetext": `${key.value} ${kind.unit}`,
         "aria-valuenow": key.value, "aria-valuemin": kind.low, "aria-valuemax": kind.high,
       });
       dot.classList.toggle("picked", chosen.includes(i));

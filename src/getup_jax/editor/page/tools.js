@@ -16,7 +16,7 @@ import { set } from "./svg.js";
 
 /** @type {[Kind, string, string][]} */
 const PASSING = [
-  ["auto", "Auto", "Bends evenly through the key"], ["flat", "Flat", "Level at the key: neither rises nor falls"], ["linear", "Linear", "Straight to the keys beside it"],
+  ["auto", "Auto", "Bends evenly through the point"], ["flat", "Flat", "Level at the point: neither rises nor falls"], ["linear", "Linear", "Straight to the points beside it"],
 ];
 
 export class Tools {
@@ -31,10 +31,10 @@ export class Tools {
     };
     root.append(
       el("span", { class: "pair" }, ...PASSING.map(([kind, words, title]) => button(`pass-${kind}`, words, title, () => this.passing(kind)))),
-      el("label", { title: "Of the selected keys" }, number("key-time", "Time of the keys", (t) => this.time(t)), el("span", { id: "time-unit" }, "s")),
-      el("label", { title: "Of the selected keys" }, number("key-value", "Value of the keys", (v) => this.value(v)), el("span", { id: "value-unit" }, "m")),
-      button("key-delete", "Delete", "The selected keys (Del)", () => this.remove()),
-      el("span", { class: "pair" }, button("key-copy", "Copy", "Ctrl+C", () => this.copy()), button("key-paste", "Paste", "At the time at hand, in this or another variant; from one angle's curve also into that of the selected key (Ctrl+V)", () => this.paste())),
+      el("label", { title: "Of the selected points" }, number("key-time", "Time of the points", (t) => this.time(t)), el("span", { id: "time-unit" }, "s")),
+      el("label", { title: "Of the selected points" }, number("key-value", "Value of the points", (v) => this.value(v)), el("span", { id: "value-unit" }, "m")),
+      button("key-delete", "Delete", "The selected points (Del)", () => this.remove()),
+      el("span", { class: "pair" }, button("key-copy", "Copy", "Ctrl+C", () => this.copy()), button("key-paste", "Paste", "At the time at hand, in this or another variant; from one angle's curve also into that of the selected point (Ctrl+V)", () => this.paste())),
       el("span", { class: "pair" }, button("hold", "Hold", "A pause at the time at hand; everything after it comes later (H)", () => this.hold()), number("hold-seconds", "Seconds of a pause", () => {})),
       el("span", { class: "pair" }, button("stretch", "Stretch ×", "The part from in to out, or all of it, takes so many times as long", () => this.stretch()), number("stretch-factor", "Times as long", () => {})),
       el("select", { id: "pose", "aria-label": "Pose", title: "A pose from in to out, or at the time at hand: its height and angles become the curves there", onchange: () => this.pose() }),
@@ -63,7 +63,7 @@ export class Tools {
 
   some() {
     if (selection.count(this.picked)) return true;
-    say("Select keys first: click one, or draw a box around several.");
+    say("Select points first: click one, or draw a box around several.");
     return false;
   }
 
@@ -85,7 +85,8 @@ export class Tools {
   copy() {
     if (!this.some()) return;
     this.graph.clip = selection.copy(this.store.now, this.picked);
-    say(`${selection.count(this.picked)} keys copied; paste puts them at the time at hand.`);
+    const count = selection.count(this.picked);
+    say(`${count} ${count === 1 ? "point" : "points"} copied; paste begins at the time at hand.`);
   }
 
   paste() {
