@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from browser import (
     BROWSER,
+    FRONT,
     HEIGHT,
     achieved,
     drag,
@@ -12,8 +14,9 @@ from browser import (
     edited,
     judged,
     opened,
+    picture,
     says,
-    shown,
+    shot,
     value,
 )
 
@@ -112,6 +115,81 @@ def test_escape_takes_a_drag_back_and_keys_work_wherever_the_focus_is(page_serve
         assert value(page, HEIGHT, 4) == old
 
 
+def test_a_drag_that_is_taken_back_does_not_go_on(page_server):
+    """Of a point by undo, and of a slider by Escape, while the button is still held."""
+    with opened(page_server[0]) as page:
+        old, seconds = value(page, HEIGHT, 4), page.input_value("#seconds")
+        point = page.locator(f'[aria-label="{HEIGHT}"] [data-point="4"]').bounding_box()
+        x, y = point["x"] + 6, point["y"] + 6
+        press(page, (x, y), (x, y - 40))
+        assert value(page, HEIGHT, 4) > old
+        page.keyboard.press("Control+z")
+        page.mouse.move(x, y - 45)
+        page.mouse.up()
+        assert value(page, HEIGHT, 4) == old
+        for slider in ("#duration", "#shift"):
+            box = page.locator(slider).bounding_box()
+            y = box["y"] + box["height"] / 2
+            x = [box["x"] + share * box["width"] for share in (0.3, 0.6, 0.65)]
+            press(page, (x[0], y), (x[1], y))
+            assert page.is_enabled("#undo"), slider
+            page.keyboard.press("Escape")
+            page.mouse.move(x[2], y)
+            page.mouse.up()
+            drawn(page)
+            assert page.is_disabled("#undo"), slider
+            assert (page.input_value("#seconds"), page.input_value("#shift")) == (seconds, "0")
+        edited(page, lambda: page.locator("#duration").press("ArrowRight"))
+        assert page.input_value("#seconds") != seconds
+
+
+def press(page, begin, end) -> None:
+    """Drag, and keep the button down."""
+    page.mouse.move(*begin)
+    page.mouse.down()
+    page.mouse.move(*end, steps=4)
+
+
+def test_what_is_zoomed_reaches_over_no_numbers(page_server):
+    with opened(page_server[0]) as page:
+        page.click("#play")
+        box = page.locator(f'[aria-label="{HEIGHT}"]').bounding_box()
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        page.mouse.wheel(0, -600)
+        drawn(page)
+        for panel in (HEIGHT, FRONT):
+            numbers = picture(page, f'[aria-label="{panel}"]')[24:-24, 2:26]
+            assert np.ptp(numbers, axis=2).max() < 0.3, "there is a line over the numbers"
+
+
+def test_a_field_that_takes_nothing_looks_like_it(page_server):
+    with opened(page_server[0]) as page:
+        for name in ("key-time", "key-value", "place", "region", "undo"):
+            assert page.is_disabled(f"#{name}")
+            opacity = page.locator(f"#{name}").evaluate("e => getComputedStyle(e).opacity")
+            assert float(opacity) < 0.6, name
+
+
+def test_variants_apart_are_all_in_the_picture(page_server):
+    def columns() -> np.ndarray:
+        """Which columns of the view are of a body: it is in colour, the ground is not."""
+        page.wait_for_timeout(1500)  # the pictures are drawn one after the other
+        view = picture(page, "#view")
+        return (np.ptp(view[len(view) // 4 :], axis=2) > 0.15).any(axis=0)
+
+    with opened(page_server[0]) as page:
+        page.click("#play")
+        for _ in range(3):
+            edited(page, lambda: page.click("text=+ variant"))
+        page.keyboard.press("End")
+        page.check("#apart")
+        seen = columns()
+        shot(page, "apart")
+        assert (np.diff(seen.astype(int)) == 1).sum() == 4
+        assert not seen[:5].any()
+        assert not seen[-5:].any()
+
+
 @pytest.mark.parametrize("size", [(1024, 768), (1920, 1080), (390, 844)])
 def test_nothing_is_outside_of_the_window(page_server, size):
     viewport = {"width": size[0], "height": size[1]}
@@ -123,4 +201,15 @@ def test_nothing_is_outside_of_the_window(page_server, size):
         assert box["y"] + box["height"] <= size[1], "the view is below the fold"
         assert box["height"] > 150
         assert page.locator(".panel").last.bounding_box()["height"] > 80
-        assert int(shown(page)) > 0
+        row = page.locator("#tools").bounding_box()["height"] < 40
+        assert row or size[0] < 1900, "a tool has a row of its own"
+        edited(page, lambda: page.select_option("#start", value="supine_situp_squat"))
+        assert "Too far from the curves" in judged(page)
+        whole = "e => e.scrollHeight <= e.clientHeight && e.getBoundingClientRect().bottom"
+        bottom = page.locator("#verdict").evaluate(whole)
+        edge = page.locator("#report").bounding_box()
+        assert bottom, "the verdict is cut off"
+        assert bottom <= edge["y"] + edge["height"]
+        if size[0] > 900:
+            words, tools = (page.locator(e).bounding_box() for e in ("#toast", "#left"))
+            assert words["x"] > tools["x"] + tools["width"] - 1, "words lie on the tools"

@@ -12,6 +12,7 @@ from browser import (
     BROWSER,
     FRONT,
     HEIGHT,
+    SIDE,
     achieved,
     drag,
     drawn,
@@ -19,6 +20,7 @@ from browser import (
     judged,
     opened,
     saved,
+    says,
     shot,
     slowdown,
     value,
@@ -74,6 +76,33 @@ def test_points_are_added_selected_scaled_copied_and_deleted(page_server):
         assert page.locator('.point[data-kind="linear"]').count() >= 3
 
 
+def test_what_is_copied_from_one_angle_is_pasted_into_the_other(page_server):
+    with opened(page_server[0]) as page:
+        page.locator(f'[aria-label="{FRONT}"] [data-point="3"]').click()
+        page.click("#key-copy")
+        seek(page, 1.7)
+        page.locator(f'[aria-label="{SIDE}"] [data-point="4"]').click()
+        edited(page, lambda: page.click("#key-paste"))
+        (pasted,) = page.locator(f'[aria-label="{SIDE}"] .point.picked').all()
+        found = float(pasted.get_attribute("aria-valuenow"))
+        assert found == pytest.approx(value(page, FRONT, 3), abs=0.06)  # a tenth of a degree
+
+
+def test_a_frame_of_the_source_is_a_pose_to_wish_for(page_server):
+    with opened(page_server[0]) as page:
+        page.click("#play")
+        old = value(page, HEIGHT, 4)
+        edited(page, lambda: drag(page, HEIGHT, 4, 40))
+        seek(page, 1.7)
+        pose = "as its source is at the time at hand"
+        page.select_option("#pose", label=pose)
+        says(page, "toast", "Show the Source first")
+        page.check("#source")
+        page.wait_for_selector(".recorded")
+        edited(page, lambda: page.select_option("#pose", label=pose))
+        assert value(page, HEIGHT, 4) == pytest.approx(old, abs=0.08)
+
+
 def test_time_and_value_are_typed_and_read(page_server):
     with opened(page_server[0]) as page:
         page.locator(f'[aria-label="{HEIGHT}"] [data-point="4"]').click()
@@ -87,9 +116,13 @@ def test_time_and_value_are_typed_and_read(page_server):
         label = page.locator(f'[aria-label="{HEIGHT}"] [data-point="4"]').get_attribute(
             "aria-label"
         )
-        assert "1.80 s" in label
+        assert "point 5 of 9, 1.80 s" in label  # as the help and the documents call it
         page.check("#frames")
         assert page.input_value("#key-time") == "54"
+        page.keyboard.press("Control+a")
+        drawn(page)
+        assert page.is_disabled("#key-value"), "metres and degrees have no value in common"
+        assert page.is_enabled("#key-time")
 
 
 def test_two_fingers_zoom_the_curves_and_not_the_page(page_server):

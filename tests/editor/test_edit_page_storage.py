@@ -22,6 +22,10 @@ for (const name of ["get", "getAll"]) {
   IDBObjectStore.prototype[name] = () => { throw new DOMException("broken"); };
 }
 """
+_COUNTED = """
+window.kept = 0;
+StorageManager.prototype.persist = async () => { window.kept += 1; throw new DOMException("no"); };
+"""
 _FULL = """
 window.put = IDBObjectStore.prototype.put;
 window.fill = () => { IDBObjectStore.prototype.put = () => { throw new DOMException("full"); }; };
@@ -57,6 +61,16 @@ def test_a_browser_that_keeps_nothing_edits_all_the_same(page_server, script, wo
         page.click("#project")
         with page.expect_download():
             page.click("#project-export")
+
+
+def test_a_browser_is_asked_once_to_forget_no_project(page_server):
+    with opened_after(page_server[0], _COUNTED) as page:
+        assert page.evaluate("kept") == 0
+        for pixels in (30, -30):
+            edited(page, lambda up=pixels: drag(page, HEIGHT, 4, up))
+            page.wait_for_timeout(300)
+            page.wait_for_selector("body[data-saved]")
+        assert page.evaluate("kept") == 1
 
 
 def test_a_project_that_is_not_stored_is_not_left_without_a_word(page_server):

@@ -25,7 +25,8 @@ class Shared {
   }
 }
 
-globalThis.addEventListener ??= () => {};
+const closing = []; // what listens to the closing of the page
+globalThis.addEventListener = (_, listener) => closing.push(listener);
 globalThis.document ??= /** @type {any} */ ({ body: { dataset: {} } });
 
 function tab(storage) {
@@ -44,6 +45,21 @@ test("every finished edit is stored, also one that is made while another is bein
   const [stored] = storage.projects.values();
   assert.equal(seconds(stored), 6);
   assert.equal(stored.revision, store.project.revision);
+});
+
+test("who closes the page is warned until the last edit is stored", async () => {
+  const { store, autosave } = tab(new Shared()), warns = closing.at(-1);
+  const warned = () => {
+    const event = new Event("beforeunload", { cancelable: true });
+    warns(event);
+    return event.defaultPrevented;
+  };
+  await autosave.open(project(curve(), "p"), true);
+  assert.equal(warned(), false);
+  store.commit((now) => last(now, 8));
+  assert.ok(warned());
+  await autosave.writing;
+  assert.equal(warned(), false);
 });
 
 test("to open a project, and to look at a variant anew, stores nothing", async () => {

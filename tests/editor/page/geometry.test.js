@@ -2,9 +2,10 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { close } from "./samples.js";
-import { cameraAt } from "../../../src/getup_jax/editor/page/camera.js";
-import { contacts, reached } from "../../../src/getup_jax/editor/page/contacts.js";
+import { asideOf, cameraAt, rowDistance } from "../../../src/getup_jax/editor/page/camera.js";
+import { contacts, reached, wordOf } from "../../../src/getup_jax/editor/page/contacts.js";
 import { around, pinched, Scale, snapped, timeTicks, within, zoomed } from "../../../src/getup_jax/editor/page/graph_scale.js";
+import { featuresAt } from "../../../src/getup_jax/editor/page/motion_recording.js";
 import { lostRuns } from "../../../src/getup_jax/editor/page/panel_motion.js";
 
 test("a scale turns places into times and values, and back", () => {
@@ -58,6 +59,15 @@ test("the camera stays above the ground, flat or not, wherever it is turned", ()
   }
 });
 
+test("variants side by side are all seen, whichever is edited", () => {
+  const half = Math.tan((19 * Math.PI) / 180) * 1.4; // of a view of 654 x 467
+  for (const count of [2, 3, 4]) {
+    const places = Array.from({ length: count }, (_, i) => asideOf(i, count)), seen = half * rowDistance(count, half);
+    close([places[0] + places[count - 1]], [0]);
+    assert.ok(places.every((place) => Math.abs(place) + 0.9 < seen));
+  }
+});
+
 test("contacts are the links on the ground, turned as they are and on hills", () => {
   const capsule = { link: 0, kind: "capsule", size: [0.05, 0.2], position: [0, 0, 0], quaternion: [1, 0, 0, 0] };
   const scene = { shapes: [capsule], links: ["foot_l"] }, upright = [0, 0, 0.25, 1, 0, 0, 0], lying = [0, 0, 0.25, Math.SQRT1_2, Math.SQRT1_2, 0, 0];
@@ -65,6 +75,17 @@ test("contacts are the links on the ground, turned as they are and on hills", ()
   assert.deepEqual(touching(upright), ["left foot"]);
   assert.deepEqual(touching(lying), []);
   assert.deepEqual(touching(lying, { origin: [-1, -1], step: 1, points: 3, heights: Array(9).fill(0.2) }), ["left foot"]);
+});
+
+test("a recording has height and angles at a share of its time", () => {
+  const frames = Float32Array.from({ length: 3 * 10 }, (_, i) => i);
+  assert.deepEqual([0, 0.4, 1].map((share) => [...featuresAt({ fps: 30, total: 3, links: 1, frames }, share)]), [[7, 8, 9], [17, 18, 19], [27, 28, 29]]);
+});
+
+test("every part of the body has a word", () => {
+  const limbs = ["shoulder", "arm", "forearm", "hand", "thigh", "shin", "foot"], sides = { l: /^left /, r: /^right / };
+  for (const limb of limbs) for (const [side, word] of Object.entries(sides)) assert.match(wordOf(`${limb}_${side}`), word);
+  assert.deepEqual(["pelvis", "spine_low", "spine_mid", "spine_upper", "neck", "head"].map(wordOf), ["pelvis", "torso", "torso", "torso", "neck", "head"]);
 });
 
 test("of a wished pose one sees which contacts were there for half of the time", () => {

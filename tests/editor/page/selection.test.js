@@ -48,6 +48,8 @@ test("deleted keys are gone, but for the ends; kinds and numbers are set for all
   assert.deepEqual([keysIn(flat, "height")[2].kind, keysIn(flat, "front_angle")[3].kind, keysIn(flat, "height")[3].kind], ["flat", "flat", "auto"]);
   const typed = selection.place(now, { height: [4] }, { time: 0.55, value: 0.8 });
   assert.deepEqual([times(typed)[4], values(typed)[4]], [0.55, 0.8]);
+  const several = selection.place(now, { height: [4, 5], front_angle: [3] }, { time: 0.45 });
+  close([...times(several).slice(4, 6), times(several, "front_angle")[3]], [0.45, 0.575, 0.45]);
 });
 
 test("what is copied is pasted at another time, and into a curve of another duration", () => {
@@ -58,15 +60,25 @@ test("what is copied is pasted at another time, and into a curve of another dura
   close(values(pasted).slice(6, 8), clip.height.map((key) => key.value), 1e-3);
   assert.ok(times(pasted, "front_angle").some((t) => Math.abs(t - 0.7625) < 1e-9));
   assert.equal(pasted.curve.side_angle, other.curve.side_angle);
+  assert.deepEqual(selection.pasted(pasted, clip, 0.7), { height: [6, 7], side_angle: [], front_angle: [7] });
   const late = selection.paste(other, clip, 0.99);
   assert.ok(times(late).every((t) => t <= 1));
+});
+
+test("what is copied from one angle goes to the curve whose keys are selected", () => {
+  const clip = selection.copy(content(), { front_angle: [3, 4] });
+  assert.deepEqual(selection.onto(clip, { side_angle: [2] }), { side_angle: clip.front_angle });
+  for (const picked of [{}, { front_angle: [3] }, { height: [3] }, { side_angle: [2], front_angle: [3] }]) assert.deepEqual(selection.onto(clip, picked), clip);
 });
 
 test("a box selects the keys in it, and a selection forgets keys that are gone", () => {
   const now = content();
   assert.deepEqual(selection.inside(keysIn(now, "height"), [0.3, 0], [0.7, 2]), [3, 4, 5]);
   assert.deepEqual(selection.inside(keysIn(now, "height"), [0.7, 2], [0.3, 0]), [3, 4, 5]);
-  assert.deepEqual(selection.valid(now, { height: [2, 11] }).height, [2]);
+  const other = selection.remove(now, { height: [1] }), before = selection.lengths(now), picked = { height: [2], side_angle: [3] };
+  assert.deepEqual(selection.valid(now, picked, before), { ...picked, front_angle: [] });
+  // another key is the second one now
+  assert.deepEqual(selection.valid(other, picked, before), { height: [], side_angle: [3], front_angle: [] });
   assert.equal(selection.count({ height: [1, 2], side_angle: [3] }), 3);
   assert.deepEqual(selection.toggled({ height: [1] }, "height", 1).height, []);
 });

@@ -19,7 +19,7 @@ export class Autosave {
     /** @type {Project | null} as it was stored or read last */
     this.known = null;
     addEventListener("beforeunload", (event) => {
-      if ((this.due || this.failed || !storage.lasting) && store.project) event.preventDefault();
+      if ((this.writing || this.failed || !storage.lasting) && store.project) event.preventDefault();
     });
   }
 

@@ -5,8 +5,9 @@ import { heightAt } from "./height.js";
 const NEAR_M = 0.015;
 const WORDS = {
   hand_r: "right hand", hand_l: "left hand", lower_arm_r: "right forearm", lower_arm_l: "left forearm", forearm_r: "right forearm", forearm_l: "left forearm",
+  arm_r: "right upper arm", arm_l: "left upper arm", shoulder_r: "right shoulder", shoulder_l: "left shoulder",
   shin_r: "right knee", shin_l: "left knee", foot_r: "right foot", foot_l: "left foot", thigh_r: "right hip", thigh_l: "left hip",
-  pelvis: "pelvis", head: "head", spine_upper: "back", chest: "back", torso: "back",
+  pelvis: "pelvis", neck: "neck", head: "head", spine_low: "torso", spine_mid: "torso", spine_upper: "torso", chest: "torso", torso: "torso",
 };
 
 /** The lowest point (m) of a shape on a link. @param {any} shape @param {ArrayLike<number>} pose position and quaternion (wxyz) */
@@ -25,13 +26,15 @@ export function turn([w, x, y, z], v) {
   return [v[0] + w * t[0] + y * t[2] - z * t[1], v[1] + w * t[1] + z * t[0] - x * t[2], v[2] + w * t[2] + x * t[1] - y * t[0]];
 }
 
+/** @param {string} link */
+export function wordOf(link) { return /** @type {Record<string, string>} */ (WORDS)[link] ?? link.replaceAll("_", " "); }
+
 /** Words for the links on the ground in a pose. @param {{ shapes: any[], links: string[] }} scene @param {Float32Array} values @param {any} ground null: flat */
 export function contacts({ shapes, links }, values, ground) {
   const found = new Set();
   for (const shape of shapes) {
     const { x, y, z } = lowest(shape, values.subarray(7 * shape.link, 7 * shape.link + 7));
-    const name = links[shape.link], word = /** @type {Record<string, string>} */ (WORDS)[name] ?? name.replaceAll("_", " ");
-    if (z - (ground ? heightAt(ground, x, y) : 0) < NEAR_M) found.add(word);
+    if (z - (ground ? heightAt(ground, x, y) : 0) < NEAR_M) found.add(wordOf(links[shape.link]));
   }
   return [...found];
 }

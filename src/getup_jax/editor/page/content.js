@@ -24,6 +24,9 @@ export function plain(curve) {
   return copy;
 }
 
+/** Whether two curves are one, as for the imports of two files that have one name. @param {Curve} a @param {Curve} b */
+export function sameCurve(a, b) { return a.name === b.name && JSON.stringify(plain(a)) === JSON.stringify(plain(b)); }
+
 /** The keys of a feature: the ones that were drawn, or those of its control points. @param {Content} now @param {Feature} feature @returns {Key[]} */
 export function keysIn(now, feature) { return now.keys[feature] ?? keysOf(now.curve[feature]); }
 

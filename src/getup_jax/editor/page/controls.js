@@ -1,7 +1,7 @@
 // The controls below the curves and in the header; they change the store and follow it.
 
 import { alike } from "./alike.js";
-import { duration, DURATION_S, keptDuration, keptName } from "./content.js";
+import { duration, DURATION_S, keptDuration, keptName, sameCurve } from "./content.js";
 import { group, option } from "./dom.js";
 import * as edits from "./edits.js";
 import { clamp, LIES } from "./features.js";
@@ -26,19 +26,30 @@ export class Controls {
     region.addEventListener("change", () => store.commit((now) => ({ ...now, region: Number(region.value) })));
     // a field that is left empty goes back to what it was
     place.addEventListener("change", () => (place.value === "" ? this.show() : this.place(Number(place.value))));
-    slider.addEventListener("input", () => store.live((now) => edits.last(now, Number(slider.value))));
-    slider.addEventListener("change", () => store.commit(null, { tag: "duration" }));
     seconds.addEventListener("change", () => (seconds.value === "" ? this.show() : this.last(Number(seconds.value))));
-    shift.addEventListener("input", () => store.live((now) => edits.shift(now, Number(shift.value))));
-    shift.addEventListener("change", () => {
-      shift.value = 0;
-      store.commit();
-    });
+    this.slide(slider, edits.last, "duration");
+    this.slide(shift, edits.shift);
     this.listenToName(elements.name);
     elements.undo.addEventListener("click", () => store.undo());
     elements.redo.addEventListener("click", () => store.redo());
     elements.reset.addEventListener("click", () => store.commit(edits.reset));
     elements.mirror.addEventListener("click", () => store.commit((now) => edits.mirror(now, this.scene.mirrored, this.scene.mirror)));
+  }
+
+  /** A draft follows the slider. One that is taken back, as by Escape or undo, stays so until the slider is let go.
+   * @param {HTMLInputElement} slider @param {(now: import("./types.js").Content, amount: number) => import("./types.js").Content} edit */
+  slide(slider, edit, tag = "") {
+    let begun = false;
+    for (const again of ["pointerdown", "focus"]) slider.addEventListener(again, () => { begun = false; });
+    slider.addEventListener("input", () => {
+      if (begun && !this.store.draft) return this.show();
+      begun = true;
+      this.store.live((now) => edit(now, Number(slider.value)));
+    });
+    slider.addEventListener("change", () => {
+      begun = false;
+      this.store.commit(null, { tag });
+    });
   }
 
   /** What a file's name may not have cannot be typed. @param {HTMLInputElement} name */
@@ -95,7 +106,7 @@ export class Controls {
 
   /** @param {string} value */
   choose(value) {
-    const i = Number(value.slice(1)), curve = value[0] === "c" ? this.scene.curves[i] : this.store.project?.imported[i]?.curve;
+    const curve = this.curveOf(value);
     if (curve) this.store.commit((now) => edits.choose(now, curve));
   }
 
@@ -127,6 +138,7 @@ export class Controls {
     const { elements, store } = this, { now, current } = store, seconds = duration(now);
     if (document.activeElement !== elements.name) elements.name.value = now.curve.name;
     elements.duration.value = seconds;
+    if (!store.draft) elements.shift.value = 0;
     if (document.activeElement !== elements.seconds || elements.seconds.value === "") elements.seconds.value = seconds;
     elements.region.value = now.region;
     if (document.activeElement !== elements.place) elements.place.value = now.place + 1;
@@ -134,14 +146,15 @@ export class Controls {
     elements.redo.disabled = !current.history.future.length;
     this.fillCurves();
     if (!store.draft) this.fillStarts();
-    const chosen = [...elements.curve.options].find((o) => this.named(o.value) === now.reference.name);
+    const named = [...elements.curve.options].filter((o) => this.curveOf(o.value)?.name === now.reference.name);
+    const chosen = named.find((o) => sameCurve(/** @type {Curve} */ (this.curveOf(o.value)), now.reference)) ?? named[0];
     elements.curve.value = chosen ? chosen.value : "";
   }
 
-  /** @param {string} value of an option */
-  named(value) {
+  /** @param {string} value of an option @returns {Curve | undefined} */
+  curveOf(value) {
     const i = Number(value.slice(1));
-    return value[0] === "c" ? this.scene.curves[i].name : value[0] === "i" ? this.store.project?.imported[i].curve.name : null;
+    return value[0] === "c" ? this.scene.curves[i] : value[0] === "i" ? this.store.project?.imported[i]?.curve : undefined;
   }
 
   /** Every start with how far it is from where the curves begin; one that the server does not list as it is. */

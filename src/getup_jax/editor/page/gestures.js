@@ -76,13 +76,20 @@ export class Gestures {
     }, { signal, capture: true });
   }
 
-  /** A gesture that edits: the store's draft follows it. @param {PointerEvent} event @param {(e: PointerEvent) => void} move */
+  /** A gesture that edits: the store's draft follows it. One whose draft is taken back from elsewhere, as by undo, is over.
+   * @param {PointerEvent} event @param {(e: PointerEvent) => void} move */
   edit(event, move) {
     const { store } = this.graph;
+    let begun = false;
     event.preventDefault();
     event.stopPropagation();
     this.panel.hold(true);
-    this.follow(event, move, (e) => {
+    const go = (/** @type {PointerEvent} */ e) => {
+      if (begun && !store.draft) return this.stop?.(null);
+      move(e);
+      begun = store.draft !== null;
+    };
+    this.follow(event, go, (e) => {
       this.panel.hold(false);
       if (e) store.commit(null, { at: e.timeStamp });
       else store.cancel();

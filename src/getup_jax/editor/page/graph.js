@@ -5,7 +5,7 @@ import { duration, keysIn } from "./content.js";
 import { KINDS } from "./features.js";
 import { around, Scale, within } from "./graph_scale.js";
 import { Panel } from "./panel.js";
-import { valid } from "./selection.js";
+import { lengths, valid } from "./selection.js";
 import { FEATURES } from "./spline.js";
 
 /** @import { Feature } from "./types.js" */
@@ -31,6 +31,8 @@ export class Graph {
     this.seek = seek;
     /** @type {Picked} */
     this.picked = {};
+    /** @type {number[]} of the curves when those were selected */
+    this.lengths = [];
     /** @type {Range | null} null: the whole motion */
     this.times = null;
     /** @type {Partial<Record<Feature, Range>>} where zoomed */
@@ -49,12 +51,13 @@ export class Graph {
   /** @param {Picked} picked */
   select(picked) {
     this.picked = picked;
+    this.lengths = lengths(this.store.now);
     this.draw();
     this.onSelect();
   }
 
   /** Those that are selected and still there. */
-  get chosen() { return valid(this.store.now, this.picked); }
+  get chosen() { return valid(this.store.now, this.picked, this.lengths); }
 
   /** @returns {Range} */
   get shownTimes() { return this.times ? within(this.times, this.model.span()) : [0, this.model.span()]; }

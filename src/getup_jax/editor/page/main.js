@@ -176,6 +176,7 @@ function show() {
   stage.arrange();
   write($("project"), store.project?.name ?? "Project");
   $("apart-label").hidden = store.variants.length < 2;
+  $("source").disabled = !sources.any;
   showReport();
 }
 

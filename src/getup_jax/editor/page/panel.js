@@ -12,6 +12,7 @@ import { fill, make, polyline, set, text } from "./svg.js";
 
 /** @import { Feature } from "./types.js" */
 
+const ROOM_PX = 10; // for a point on the edge
 const LEGEND_PX = 420; // narrower, words would lie on each other
 const MISFIT = { height: 0.015, side_angle: 2, front_angle: 2 }; // shown from here on: m, degrees
 
@@ -27,11 +28,14 @@ export class Panel {
     this.box.className = "panel";
     this.svg = make("svg", { role: "group", "aria-label": this.kind.title });
     this.back = make("g");
-    this.lines = make("g");
-    this.dots = make("g");
+    this.inside = make("rect");
+    const clip = make("clipPath", { id: `inside-${feature}` }), clipped = { "clip-path": `url(#inside-${feature})` };
+    clip.append(this.inside);
+    this.lines = make("g", clipped);
+    this.dots = make("g", clipped);
     this.over = make("g");
     this.now = el("div", { class: "now" }); // no part of the drawing, since it moves in every frame
-    this.svg.append(this.back, this.lines, this.over, this.dots);
+    this.svg.append(clip, this.back, this.lines, this.over, this.dots);
     this.box.append(this.svg, this.now);
     root.append(this.box);
     /** @type {SVGElement[]} */
@@ -51,6 +55,9 @@ export class Panel {
     if (width !== this.width || height !== this.height) {
       Object.assign(this, { width, height });
       set(this.svg, { viewBox: `0 0 ${width} ${height}` });
+      // what is zoomed reaches over neither words nor numbers
+      const across = Math.max(width - LEFT - RIGHT + 2 * ROOM_PX, 0), down = Math.max(height - TOP - BOTTOM + 4, 0);
+      set(this.inside, { x: LEFT - ROOM_PX, y: TOP - 2, width: across, height: down });
     }
     if (!width) return;
     this.drawBack();
@@ -159,7 +166,7 @@ export class Panel {
       const at = key.time * seconds;
       set(dot, {
         cx: scale.x(at), cy: scale.y(key.value), "data-kind": key.kind, "aria-selected": chosen.includes(i),
-        "aria-label": `${kind.title}, key ${i + 1} of ${keys.length}, ${at.toFixed(2)} s, ${key.kind}`, "aria-valuetext": `${key.value} ${kind.unit}`,
+        "aria-label": `${kind.title}, point ${i + 1} of ${keys.length}, ${at.toFixed(2)} s, ${key.kind}`, "aria-valuetext": `${key.value} ${kind.unit}`,
         "aria-valuenow": key.value, "aria-valuemin": kind.low, "aria-valuemax": kind.high,
       });
       dot.classList.toggle("picked", chosen.includes(i));

@@ -63,10 +63,11 @@ export function remove(now, picked) {
   return each(now, picked, (keys, chosen) => keys.filter((_, i) => i === 0 || i === keys.length - 1 || !chosen.includes(i)));
 }
 
-/** The number typed: one time (share) or value for all that are selected. @param {Content} now @param {Picked} picked @param {{ time?: number, value?: number }} typed */
+/** The number typed: one value for all that are selected, or the time (share) of the first of each curve, which the others go with. @param {Content} now @param {Picked} picked @param {{ time?: number, value?: number }} typed */
 export function place(now, picked, { time, value }) {
   return each(now, picked, (keys, chosen) => {
-    const moved = time === undefined ? keys.map((key) => key.time) : times(keys, chosen, () => time);
+    const first = keys[chosen.find((i) => i > 0) ?? 0], to = (/** @type {Key} */ key) => key.time + (time ?? 0) - first.time;
+    const moved = time === undefined ? keys.map((key) => key.time) : times(keys, chosen, to);
     return keys.map((key, i) => (chosen.includes(i) ? { ...key, time: moved[i], value: value ?? key.value } : key));
   });
 }
@@ -81,6 +82,13 @@ export function copy(now, picked) {
     if (picked[feature]?.length) clip[feature] = picked[feature].map((i) => ({ ...keysIn(now, feature)[i] })).map((key) => ({ ...key, time: (key.time - first) * seconds }));
   }
   return clip;
+}
+
+/** A clip of one curve for the curve whose keys are selected alone, where both are angles. @param {Clip} clip @param {Picked} picked @returns {Clip} */
+export function onto(clip, picked) {
+  const from = FEATURES.filter((feature) => clip[feature]?.length), to = FEATURES.filter((feature) => picked[feature]?.length);
+  if (from.length !== 1 || to.length !== 1 || [from[0], to[0]].includes("height")) return clip;
+  return { [to[0]]: clip[from[0]] };
 }
 
 /** A clip from a time (share) on; what lay in its place goes, and so does what reaches past the end. @param {Content} now @param {Clip} clip @param {number} at */
@@ -100,6 +108,16 @@ export function paste(now, clip, at) {
   return withKeys(now, changed);
 }
 
+/** The keys that a paste has put there. @param {Content} now @param {Clip} clip @param {number} at @returns {Picked} */
+export function pasted(now, clip, at) {
+  const seconds = now.curve.durations[0];
+  return Object.fromEntries(FEATURES.map((feature) => {
+    const own = (clip[feature] ?? []).map((key) => at + key.time / seconds), room = GAP / 2;
+    const among = (/** @type {Key} */ key) => own.length > 0 && key.time > own[0] - room && key.time < own[own.length - 1] + room;
+    return [feature, keysIn(now, feature).flatMap((key, i) => (among(key) ? [i] : []))];
+  }));
+}
+
 /** The keys of a curve that lie in a box of time (share) and value. @param {Key[]} keys @param {number[]} from @param {number[]} to */
 export function inside(keys, from, to) {
   const between = (/** @type {number} */ x, /** @type {number} */ a, /** @type {number} */ b) => x >= Math.min(a, b) && x <= Math.max(a, b);
@@ -113,7 +131,11 @@ export function toggled(picked, feature, i) {
   return { ...picked, [feature]: changed };
 }
 
-/** What is still there of a selection. @param {Content} now @param {Picked} picked @returns {Picked} */
-export function valid(now, picked) {
-  return Object.fromEntries(FEATURES.map((feature) => [feature, (picked[feature] ?? []).filter((i) => i < keysIn(now, feature).length)]));
+/** How many keys each curve has. @param {Content} now @returns {number[]} */
+export function lengths(now) { return FEATURES.map((feature) => keysIn(now, feature).length); }
+
+/** What is still there of a selection: a curve that has more or fewer keys than before has others at their numbers. @param {Content} now @param {Picked} picked @param {number[]} before lengths when they were selected @returns {Picked} */
+export function valid(now, picked, before) {
+  const there = lengths(now);
+  return Object.fromEntries(FEATURES.map((feature, f) => [feature, there[f] === before[f] ? picked[feature] ?? [] : []]));
 }

@@ -1,5 +1,6 @@
 // The motions behind the curves: kept with what was imported, asked for where the library has it.
 
+import { sameCurve } from "./content.js";
 import { recordings } from "./files.js";
 
 /** @import { Recording } from "./types.js" */
@@ -17,13 +18,21 @@ export class Sources extends EventTarget {
     this.wanted = false;
   }
 
-  /** The one behind the curve at hand; none where it starts elsewhere, as its mirror image does. @returns {Recording | null} */
-  get recording() {
-    if (!this.store.project) return null;
+  /** Whether there is one behind the curve at hand; none where it starts elsewhere, as its mirror image does. */
+  get any() {
+    if (!this.store.project) return false;
     const { curve, reference } = this.store.now;
-    if (curve.start !== reference.start) return null;
-    const own = this.store.project.imported.find((one) => one.curve.name === reference.name);
-    return own?.recording ?? this.known.get(reference.name) ?? null;
+    const same = curve.start === reference.start && JSON.stringify(curve.pose) === JSON.stringify(reference.pose);
+    return same && Boolean(this.own?.recording || this.library.has(reference.name));
+  }
+
+  /** @returns {Recording | null} */
+  get recording() { return this.any ? this.own?.recording ?? this.known.get(this.store.now.reference.name) ?? null : null; }
+
+  /** What was imported as the curve at hand; several files may have one name. */
+  get own() {
+    const { reference } = this.store.now, named = this.store.project?.imported.filter((one) => one.curve.name === reference.name) ?? [];
+    return named.find((one) => sameCurve(one.curve, reference)) ?? named[0];
   }
 
   /** Asks for what is to be shown and not there yet. */

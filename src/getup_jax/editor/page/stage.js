@@ -106,7 +106,8 @@ export class Stage {
     if (!view) return;
     if (!recording || !motion?.count) return view.poseSource(null, () => new Float32Array());
     const share = Math.min(player.time / duration(this.store.now), 1), first = poseAt(recording, 0), begin = motion.pose(0);
-    view.source.group.position.set(begin[0] - first[0], begin[1] - first[1], 0);
+    const { x, y } = view.bodies.get(this.store.active)?.group.position ?? { x: 0, y: 0 }; // aside, too
+    view.source.group.position.set(x + begin[0] - first[0], y + begin[1] - first[1], 0);
     view.poseSource(`${this.store.now.reference.name} ${Math.round(share * recording.total)}`, () => poseAt(recording, share));
   }
 

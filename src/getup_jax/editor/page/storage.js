@@ -19,6 +19,7 @@ export class Storage {
     this.database = null;
     /** @type {Map<string, Project>} */
     this.memory = new Map();
+    this.kept = false; // asked to be
   }
 
   async open() {
@@ -61,6 +62,7 @@ export class Storage {
     const other = there && there.revision !== project.revision;
     const written = other ? { ...copyOf(stored, `${project.name.slice(0, 90)} (copy)`), revision: 1 } : stored;
     projects.put(written);
+    if (project.variants.some((one) => one.history.past.length)) this.keep(); // something was edited
     const { id, name, saved } = written;
     transaction.objectStore(LIST).put({ id, name, saved });
     await new Promise((resolve, reject) => {
@@ -68,6 +70,13 @@ export class Storage {
       transaction.onabort = transaction.onerror = () => reject(transaction.error);
     });
     return written;
+  }
+
+  /** Once: that the browser does not make room by forgetting. It may ask the user, or say no. */
+  keep() {
+    if (this.kept) return;
+    this.kept = true;
+    navigator.storage?.persist?.().catch(() => {});
   }
 
   /** @param {string} id */

@@ -5,6 +5,7 @@ import { duration, keysIn } from "./content.js";
 import { $, el, group, option, write } from "./dom.js";
 import * as edits from "./edits.js";
 import { clamp, KINDS } from "./features.js";
+import { featuresAt } from "./motion_recording.js";
 import { say } from "./notice.js";
 import { POSES } from "./poses.js";
 import * as selection from "./selection.js";
@@ -15,7 +16,7 @@ import { set } from "./svg.js";
 
 /** @type {[Kind, string, string][]} */
 const PASSING = [
-  ["auto", "Auto", "Bends evenly through the key"], ["flat", "Flat", "Level at the key: neither rises nor falls"], ["linear", "Linear", "Straight to the keys beside it"],
+  ["auto", "Auto", "Bends evenly through the point"], ["flat", "Flat", "Level at the point: neither rises nor falls"], ["linear", "Linear", "Straight to the points beside it"],
 ];
 
 export class Tools {
@@ -30,10 +31,10 @@ export class Tools {
     };
     root.append(
       el("span", { class: "pair" }, ...PASSING.map(([kind, words, title]) => button(`pass-${kind}`, words, title, () => this.passing(kind)))),
-      el("label", { title: "Of the selected keys" }, number("key-time", "Time of the keys", (t) => this.time(t)), el("span", { id: "time-unit" }, "s")),
-      el("label", { title: "Of the selected keys" }, number("key-value", "Value of the keys", (v) => this.value(v)), el("span", { id: "value-unit" }, "m")),
-      button("key-delete", "Delete", "The selected keys (Del)", () => this.remove()),
-      el("span", { class: "pair" }, button("key-copy", "Copy", "Ctrl+C", () => this.copy()), button("key-paste", "Paste", "At the time at hand, in this or another variant (Ctrl+V)", () => this.paste())),
+      el("label", { title: "Of the selected points" }, number("key-time", "Time of the points", (t) => this.time(t)), el("span", { id: "time-unit" }, "s")),
+      el("label", { title: "Of the selected points" }, number("key-value", "Value of the points", (v) => this.value(v)), el("span", { id: "value-unit" }, "m")),
+      button("key-delete", "Delete", "The selected points (Del)", () => this.remove()),
+      el("span", { class: "pair" }, button("key-copy", "Copy", "Ctrl+C", () => this.copy()), button("key-paste", "Paste", "At the time at hand, in this or another variant; from one angle's curve also into that of the selected point (Ctrl+V)", () => this.paste())),
       el("span", { class: "pair" }, button("hold", "Hold", "A pause at the time at hand; everything after it comes later (H)", () => this.hold()), number("hold-seconds", "Seconds of a pause", () => {})),
       el("span", { class: "pair" }, button("stretch", "Stretch ×", "The part from in to out, or all of it, takes so many times as long", () => this.stretch()), number("stretch-factor", "Times as long", () => {})),
       el("select", { id: "pose", "aria-label": "Pose", title: "A pose from in to out, or at the time at hand: its height and angles become the curves there", onchange: () => this.pose() }),
@@ -62,7 +63,7 @@ export class Tools {
 
   some() {
     if (selection.count(this.picked)) return true;
-    say("Select keys first: click one, or draw a box around several.");
+    say("Select points first: click one, or draw a box around several.");
     return false;
   }
 
@@ -84,13 +85,15 @@ export class Tools {
   copy() {
     if (!this.some()) return;
     this.graph.clip = selection.copy(this.store.now, this.picked);
-    say(`${selection.count(this.picked)} keys copied; paste puts them at the time at hand.`);
+    const count = selection.count(this.picked);
+    say(`${count} ${count === 1 ? "point" : "points"} copied; paste begins at the time at hand.`);
   }
 
   paste() {
-    const { clip } = this.graph;
-    if (clip) this.store.commit((now) => selection.paste(now, clip, this.at));
-    else say("Nothing is copied yet.");
+    if (!this.graph.clip) return say("Nothing is copied yet.");
+    const { at } = this, clip = selection.onto(this.graph.clip, this.picked);
+    this.store.commit((now) => selection.paste(now, clip, at));
+    this.graph.select(selection.pasted(this.store.now, clip, at));
   }
 
   all() {
@@ -101,6 +104,7 @@ export class Tools {
     const seconds = clamp(Number($("hold-seconds").value) || 1, 0.1, 10), before = duration(this.store.now), { at } = this;
     $("hold-seconds").value = seconds;
     this.store.commit((now) => edits.hold(now, at, seconds));
+    this.graph.select({}); // other keys are at those numbers now
     const added = duration(this.store.now) - before;
     say(added > 0.05 ? `A pause of ${added.toFixed(1)} s at ${(at * before).toFixed(2)} s` : "The motion is as long as it may be.");
   }
@@ -110,6 +114,7 @@ export class Tools {
     $("stretch-factor").value = factor;
     if (to - from < 0.01) return say("From in to out there is nothing of the curves.");
     this.store.commit((now) => edits.stretch(now, from, to, factor));
+    this.graph.select({});
     this.player.setRange(null);
   }
 
@@ -117,7 +122,7 @@ export class Tools {
   fillPoses(scene) {
     const starts = scene.starts.map((/** @type {any} */ s, /** @type {number} */ i) => option(`s${i}`, s.name));
     const poses = POSES.map(({ name }, i) => option(`p${i}`, name));
-    $("pose").replaceChildren(option("", "Pose…"), group("poses", poses), group("this motion", [option("now", "as the body is at the time at hand")]), group("lying as", starts));
+    $("pose").replaceChildren(option("", "Pose…"), group("poses", poses), group("this motion", [option("now", "as the body is at the time at hand"), option("source", "as its source is at the time at hand")]), group("lying as", starts));
     this.scene = scene;
   }
 
@@ -129,6 +134,7 @@ export class Tools {
     const [from, to] = this.player.range ? this.part : [this.at, this.at];
     const pose = value[0] === "p" ? POSES[Number(value.slice(1))] : undefined;
     this.store.commit((now) => edits.wish(now, from, to, values, pose && { name: pose.name, contacts: pose.contacts }));
+    this.graph.select({});
     say("Height and angles are wished there. What touches the ground is the policy's choice: the report says what was reached.");
   }
 
@@ -141,9 +147,18 @@ export class Tools {
       const frame = this.player.frame(motion, this.graph.model.controlDt);
       return Object.fromEntries(FEATURES.map((f, i) => [f, motion.features[i][frame]]));
     }
+    if (value === "source") return this.sourceValues();
     if (value[0] !== "s") return null;
     const { first } = this.scene.starts[Number(value.slice(1))];
     return Object.fromEntries(FEATURES.map((f, i) => [f, first[i]]));
+  }
+
+  /** Of the motion that the curve was made from, at the time at hand. @returns {Partial<Record<Feature, number>> | null} */
+  sourceValues() {
+    const recording = this.graph.model.recording();
+    if (!recording) say("Show the Source first: the motion that this curve was made from.");
+    const found = recording && featuresAt(recording, this.at);
+    return found && Object.fromEntries(FEATURES.map((f, i) => [f, found[i]]));
   }
 
   /** @param {boolean} on */
@@ -162,10 +177,11 @@ export class Tools {
       const found = new Set(keys.map(of));
       return found.size === 1 ? [...found][0] : "";
     };
-    const unit = keys.length && keys.every((k) => k.feature === "height") ? "m" : keys.length ? "°" : "";
+    const kindOf = (/** @type {typeof keys[0]} */ key) => (key.feature === "height" ? "m" : "°"), units = new Set(keys.map(kindOf));
+    const unit = units.size === 1 ? [...units][0] : ""; // metres and degrees have no value in common
     const time = one(({ time: t }) => (graph.frames ? Math.round((t * seconds) / graph.model.controlDt) : Number((t * seconds).toFixed(3))));
     this.put("key-time", time, keys.length);
-    this.put("key-value", one((key) => Number(key.value.toFixed(3))), keys.length);
+    this.put("key-value", one((key) => Number(key.value.toFixed(3))), unit ? keys.length : 0);
     write($("time-unit"), graph.frames ? "frame" : "s");
     write($("value-unit"), unit);
     const kind = one((key) => key.kind), angles = keys.length && keys.every((k) => k.feature !== "height");

@@ -4,7 +4,7 @@ import {
   Color, DirectionalLight, Fog, HemisphereLight, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer,
 } from "./vendor/three.min.js";
 import { Body, SOURCE } from "./body.js";
-import { cameraAt, pinch } from "./camera.js";
+import { asideOf, cameraAt, pinch, rowDistance } from "./camera.js";
 import { drawsInSoftware, Fence } from "./gpu.js";
 import { makeGround } from "./ground.js";
 import { heightAt } from "./height.js";
@@ -13,7 +13,7 @@ const LOOK_AT_M = 0.6; // above the ground
 const FOG_M = [9, 26]; // from the camera
 const FOG_PATCH_M = [4.5, 10.5]; // a piece of irregular ground fades before its edge
 const STILL_M = 0.002; // the camera does not follow less than this
-const APART_M = 1.3; // from variant to variant, where they are side by side
+const FARTHEST_M = 15; // of the camera from what it looks at
 const STILL = [1920, 1080]; // pixels of a picture that is exported
 const SLOW_MS = 50; // a picture; they are drawn more plainly when slower than this
 
@@ -103,10 +103,17 @@ export class View {
     for (const [slot, body] of this.bodies) {
       if (!slots.includes(slot)) this.hide(body);
       body.dress(slot !== active, slot);
-      const aside = this.apart ? (slots.indexOf(slot) - slots.indexOf(active)) * APART_M : 0;
+      const aside = this.apart ? asideOf(slots.indexOf(slot), slots.length) : 0;
       body.group.position.set(-aside * Math.sin(this.home), aside * Math.cos(this.home), 0);
     }
+    if (this.apart) this.seeRow(slots.length);
     this.dirty = true;
+  }
+
+  /** @param {number} count of the variants side by side */
+  seeRow(count) {
+    const half = Math.tan((this.camera.fov * Math.PI) / 360) * this.camera.aspect;
+    this.orbit.distance = Math.max(this.orbit.distance, Math.min(rowDistance(count, half), FARTHEST_M));
   }
 
   /** @param {Body} body */
@@ -221,7 +228,7 @@ export class View {
   turn(azimuth, elevation, zoom = 1) {
     this.orbit.azimuth += azimuth;
     this.orbit.elevation = Math.min(Math.max(this.orbit.elevation + elevation, -0.05), 1.5);
-    this.orbit.distance = Math.min(Math.max(this.orbit.distance * zoom, 1), 15);
+    this.orbit.distance = Math.min(Math.max(this.orbit.distance * zoom, 1), FARTHEST_M);
     this.dirty = true;
   }
 
