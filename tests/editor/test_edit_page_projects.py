@@ -12,6 +12,7 @@ from browser import (
     drag,
     edited,
     opened,
+    says,
     served,
     shown,
     value,
@@ -74,7 +75,10 @@ def test_projects_are_made_exported_imported_and_removed(page_server, tmp_path):
         assert page.locator("#project-list li").count() == 3
         page.locator('#project-list button[title="Remove"]:not([disabled])').first.click()
         page.wait_for_function("() => document.querySelectorAll('#project-list li').length === 2")
+        assert page.locator("#removed-list li").count() == 1
         page.click("#toast button")
+        page.wait_for_selector("#removed-list", state="detached")
+        assert page.locator("#project-list li").count() == 3
         bad = tmp_path / "bad.getup.json"
         bad.write_text('{"format": 1}')
         page.set_input_files("#file-project", str(bad))
@@ -101,3 +105,41 @@ def test_two_tabs_of_one_project_lose_nothing(page_server):
             tab.wait_for_selector("body[data-shown]", timeout=60_000)
             assert value(tab, HEIGHT, 4) == found
             assert int(shown(tab)) > 0
+
+
+def test_what_was_removed_outlives_its_notice_and_the_page(page_server):
+    def again() -> None:
+        kept(page)
+        page.reload()
+        page.wait_for_selector("body[data-shown]", timeout=60_000)
+
+    with opened(page_server[0]) as page:
+        edited(page, lambda: page.click("text=+ variant"))
+        edited(page, lambda: drag(page, HEIGHT, 4, 40))
+        found = value(page, HEIGHT, 4)
+        page.click('[aria-label="Remove this variant"]')
+        again()
+        page.select_option("#removed", index=1)
+        page.wait_for_function("() => document.querySelectorAll('[role=tab]').length === 2")
+        assert value(page, HEIGHT, 4) == found
+        assert page.locator("#removed").count() == 0
+        page.click('[aria-label="Remove this variant"]')
+        page.keyboard.press("Control+z")
+        assert value(page, HEIGHT, 4) == found
+        page.click("#project")
+        page.click("#project-new")
+        says(page, "project", "My get-up 2")
+        page.click("#project")
+        page.click('#project-list button[title="Remove"]:not([disabled])')
+        page.wait_for_selector("#removed-list")
+        page.click("text=Close")
+        again()
+        page.click("#project")
+        page.click("#removed-list button")
+        page.wait_for_selector("#removed-list", state="detached")
+        assert page.locator("#project-list li").count() == 2
+        page.click('#project-list button[title="Remove"]:not([disabled])')
+        page.click("#removed-forget")
+        page.click("#toast button")
+        page.wait_for_selector("#removed-list", state="detached")
+        assert page.locator("#project-list li").count() == 1

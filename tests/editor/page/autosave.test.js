@@ -5,6 +5,7 @@ import { curve } from "./samples.js";
 import { Autosave } from "../../../src/getup_jax/editor/page/autosave.js";
 import { last } from "../../../src/getup_jax/editor/page/edits.js";
 import { copyOf, project } from "../../../src/getup_jax/editor/page/project.js";
+import { Storage } from "../../../src/getup_jax/editor/page/storage.js";
 import { Store } from "../../../src/getup_jax/editor/page/store.js";
 
 /** A browser's storage of tabs that share it. */
@@ -112,4 +113,33 @@ test("a project that cannot be read is said, and the next one is opened", async 
   storage.read = async (id) => { if (id === "bad") throw new Error("“odd” cannot be read: keys"); return good; };
   assert.equal(await autosave.last(), good);
   assert.match(said.join(), /“odd” cannot be read/);
+});
+
+test("a project that was removed is not opened by itself, and stays removed", async () => {
+  const storage = new Storage(), { autosave } = tab(storage), one = project(curve(), "one"), two = project(curve(), "two");
+  await storage.open(); // Node has no database: the memory stands for it
+  await storage.write(one);
+  await storage.write(two);
+  await storage.remove(two.id);
+  assert.equal((await autosave.last()).name, "one");
+  await storage.remove(one.id);
+  assert.equal(await autosave.last(), null);
+});
+
+test("a removed project can be put back until it is forgotten; to store it again puts it back, too", async () => {
+  const storage = new Storage(), one = project(curve(), "one"), listed = async () => (await storage.list()).map(({ removed }) => Boolean(removed));
+  await storage.open();
+  const stored = await storage.write(one);
+  await storage.remove(one.id);
+  assert.deepEqual(await listed(), [true]);
+  assert.equal(await storage.forget(Date.now() - 1000), 0, "it was removed later");
+  await storage.putBack(one.id);
+  assert.deepEqual(await listed(), [false]);
+  assert.equal((await storage.read(one.id)).name, "one");
+  await storage.remove(one.id);
+  await storage.write(stored);
+  assert.deepEqual(await listed(), [false]);
+  await storage.remove(one.id);
+  assert.equal(await storage.forget(Date.now()), 1);
+  assert.deepEqual(await listed(), []);
 });

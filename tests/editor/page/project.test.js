@@ -12,15 +12,18 @@ function full() {
   s.undo();
   s.addVariant();
   s.commit((now) => edits.add(now, "height", 0.33));
+  s.addVariant();
+  s.removeActive();
   s.addImported([{ curve: curve({ name: "walk:1-9" }), file: "walk.bvh", recording: { fps: 30, total: 2, links: 1, frames: Float32Array.from({ length: 20 }, (_, i) => i / 3) } }]);
   return s.project;
 }
-const contents = ({ variants, active, imported, name }) => ({
-  active, imported, name, variants: variants.map(({ slot, history: { now, past, future } }) => ({ slot, now, past, future })),
+const contents = ({ variants, active, imported, name, removed }) => ({
+  active, imported, name, variants: [...variants, ...removed].map(({ slot, history: { now, past, future } }) => ({ slot, now, past, future })),
 });
 
-test("a project comes back from its file with variants, undo, ground and imports", () => {
+test("a project comes back from its file with variants, undo, ground, imports and what was removed", () => {
   const before = full(), after = fromText(toText(before), "a.getup.json");
+  assert.equal(after.removed.length, 1);
   assert.deepEqual(contents(after), contents(before));
   assert.notEqual(after.id, before.id, "an imported project is one of its own");
   assert.ok(after.imported[0].recording.frames instanceof Float32Array);

@@ -96,6 +96,40 @@ test("a removed variant can be put back with its undo, letters stay, and four is
   assert.equal(s.variants.length, 4);
 });
 
+test("undo right after a removal puts the variant back; after any edit it takes back the edit", () => {
+  const s = store();
+  s.addVariant();
+  s.commit(last(9));
+  s.removeActive();
+  assert.ok(s.undoable);
+  s.undo();
+  assert.deepEqual([s.active, seconds(s), s.project.removed.length], [1, 9, 0]);
+  s.removeActive();
+  s.commit(last(6));
+  s.undo();
+  assert.deepEqual([s.variants.length, seconds(s), s.project.removed.length], [1, 4, 1]);
+  s.undo();
+  assert.equal(s.variants.length, 1, "what is older than the edits is in the list alone");
+});
+
+test("the last four removed variants are kept and come back with their undo, under another letter where theirs is taken", () => {
+  const s = store();
+  for (const t of [5, 6, 7, 8, 9]) {
+    s.addVariant();
+    s.commit(last(t));
+    s.removeActive();
+  }
+  const { removed } = s.project;
+  assert.deepEqual(removed.map((v) => v.history.now.curve.durations[0]), [6, 7, 8, 9]);
+  s.addVariant(); // takes the letter that all of them had
+  for (const one of removed.slice(0, 2)) assert.ok(s.putBack(one));
+  assert.deepEqual([s.active, seconds(s), s.variants.map((v) => v.slot)], [3, 7, [0, 1, 2, 3]]);
+  assert.equal(s.putBack(removed[2]), false, "four are the most");
+  s.undo();
+  assert.equal(seconds(s), 4);
+  assert.deepEqual(s.project.removed, removed.slice(2));
+});
+
 test("the span is that of the longest variant, so that no ghost is cut off", () => {
   const s = store();
   s.commit(last(9));

@@ -27,8 +27,9 @@ export class Autosave {
   async last() {
     const open = [recalled("sessionStorage", TAB), recalled("localStorage", TAB)];
     const listed = await this.tried(() => this.storage.list());
+    const removed = new Set((listed ?? []).filter((one) => one.removed).map((one) => one.id));
     for (const id of new Set([...open, ...(listed ?? []).map((one) => one.id)])) {
-      const found = id && (await this.tried(() => this.storage.read(id)));
+      const found = id && !removed.has(id) && (await this.tried(() => this.storage.read(id)));
       if (found) return found;
     }
     return null;

@@ -142,7 +142,7 @@ export class Controls {
     if (document.activeElement !== elements.seconds || elements.seconds.value === "") elements.seconds.value = seconds;
     elements.region.value = now.region;
     if (document.activeElement !== elements.place) elements.place.value = now.place + 1;
-    elements.undo.disabled = !current.history.past.length && !store.draft;
+    elements.undo.disabled = !store.undoable && !store.draft;
     elements.redo.disabled = !current.history.future.length;
     this.fillCurves();
     if (!store.draft) this.fillStarts();

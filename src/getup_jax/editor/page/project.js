@@ -22,7 +22,7 @@ export function project(curve, name) {
 
 /** @param {string} name @returns {Project} */
 function empty(name) {
-  return { format: FORMAT, id: newId(), name, revision: 0, saved: 0, variants: [], active: 0, imported: [] };
+  return { format: FORMAT, id: newId(), name, revision: 0, saved: 0, variants: [], active: 0, removed: [], imported: [] };
 }
 
 /** `crypto.randomUUID` is missing where the page comes from another machine without a certificate. */
@@ -56,7 +56,7 @@ export function checked(content) {
   const active = variants.some((v) => v.slot === content.active) ? content.active : variants[0].slot;
   return {
     format: FORMAT, id: String(content.id), name: text(content.name, "name"), variants, active,
-    revision: Number(content.revision) || 0, saved: Number(content.saved) || 0,
+    revision: Number(content.revision) || 0, saved: Number(content.saved) || 0, removed: list(content.removed ?? [], "removed", 0, SLOTS).map(variant),
     imported: list(content.imported ?? [], "imported", 0, MOST_IMPORTED).map(importedOne),
   };
 }

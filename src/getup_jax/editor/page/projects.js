@@ -1,7 +1,8 @@
-// The dialog of projects: open, name, copy, remove, export to a file and import.
+// The dialog of projects: open, name, copy, remove and put back, export to a file and import.
 
 import { $, download, el } from "./dom.js";
 import { say } from "./notice.js";
+import { KEPT_DAYS } from "./storage.js";
 import { copyOf, fromText, project, SUFFIX, toText } from "./project.js";
 
 /** @import { Curve, Project } from "./types.js" */
@@ -21,6 +22,7 @@ export class Projects {
   async show() {
     await this.autosave.writing;
     const listed = (await this.autosave.tried(() => this.storage.list())) ?? [], dialog = $("dialog");
+    const gone = listed.filter((one) => one.removed);
     const rename = (/** @type {Event} */ event) => this.rename(/** @type {HTMLInputElement} */ (event.target));
     dialog.replaceChildren(
       el("h2", { id: "dialog-title" }, "Projects"),
@@ -28,7 +30,8 @@ export class Projects {
         ? "Kept in this browser, with variants, undo, ground and imports. Export one to keep it elsewhere."
         : "This browser keeps nothing: export the project before you close the page."),
       el("label", {}, "This project ", el("input", { id: "project-name", maxlength: 100, ".value": this.own.name, onchange: rename })),
-      el("ul", { id: "project-list" }, ...listed.map((one) => this.row(one))),
+      el("ul", { id: "project-list" }, ...listed.filter((one) => !one.removed).map((one) => this.row(one))),
+      ...(gone.length ? this.removedRows(gone) : []),
       el("p", { class: "buttons" },
         el("button", { id: "project-new", onclick: () => this.begin() }, "New"),
         el("button", { id: "project-copy", onclick: () => this.open(copyOf(this.own, `${this.own.name.slice(0, 90)} (copy)`)) }, "Copy"),
@@ -45,6 +48,32 @@ export class Projects {
       el("b", {}, name), el("small", {}, new Date(saved).toLocaleString()));
     const remove = el("button", { title: "Remove", "aria-label": `Remove ${name}`, disabled: id === this.own.id, onclick: () => this.remove(id, name) }, "×");
     return el("li", {}, open, remove);
+  }
+
+  /** Those that were removed, and a way to be rid of them before their time. @param {import("./storage.js").Listed[]} gone */
+  removedRows(gone) {
+    const row = (/** @type {import("./storage.js").Listed} */ { id, name, removed }) => el("li", {},
+      el("span", { class: "wide" }, name, el("small", {}, `removed ${new Date(removed ?? 0).toLocaleString()}`)),
+      el("button", { "aria-label": `Put back ${name}`, onclick: () => this.putBack(id) }, "Put back"));
+    return [
+      el("p", { class: "note" }, `Removed, kept for ${KEPT_DAYS} days `, el("button", { id: "removed-forget", onclick: () => this.forget(gone.length) }, "Delete them")),
+      el("ul", { id: "removed-list" }, ...gone.map(row)),
+    ];
+  }
+
+  /** @param {string} id */
+  async putBack(id) {
+    await this.autosave.tried(() => this.storage.putBack(id));
+    if ($("dialog").open) await this.show();
+  }
+
+  /** @param {number} count */
+  forget(count) {
+    const act = async () => {
+      await this.autosave.tried(() => this.storage.forget(Date.now()));
+      await this.show();
+    };
+    say(`${count === 1 ? "This project is" : `These ${count} projects are`} then gone for good.`, true, { words: "Delete", act });
   }
 
   /** @param {HTMLInputElement} input */
@@ -80,16 +109,13 @@ export class Projects {
 
   /** @param {string} id @param {string} name */
   async remove(id, name) {
-    const found = await this.autosave.tried(() => this.storage.read(id));
     const removed = await this.autosave.tried(async () => {
       await this.storage.remove(id);
       return true;
     });
     if (!removed) return;
     await this.show();
-    if (!found) return say(`Project “${name}” is removed.`);
-    const back = () => this.autosave.tried(() => this.storage.write({ ...found, revision: 0 }));
-    say(`Project “${name}” is removed.`, false, { words: "Put it back", act: back });
+    say(`Project “${name}” is removed.`, false, { words: "Put it back", act: () => this.putBack(id) });
   }
 
   export() {

@@ -17,6 +17,8 @@ export class Store extends EventTarget {
     this.project = null;
     /** @type {Content | null} */
     this.draft = null; // of the active variant, while a gesture goes on
+    /** @type {Variant | null} */
+    this.gone = null; // a variant whose removal was the last that was done: undo puts it back
   }
 
   /** @returns {Variant[]} */
@@ -24,6 +26,8 @@ export class Store extends EventTarget {
   get active() { return this.project?.active ?? 0; }
   get current() { return /** @type {Variant} */ (this.variants.find((v) => v.slot === this.active)); }
   get now() { return this.draft ?? this.current.history.now; }
+
+  get undoable() { return this.gone !== null || this.current.history.past.length > 0; }
 
   /** What a variant is now. @param {Variant} variant */
   contentOf(variant) { return variant.slot === this.active ? this.now : variant.history.now; }
@@ -34,7 +38,7 @@ export class Store extends EventTarget {
   /** @param {Project} project */
   open(project) {
     this.project = project;
-    this.draft = null;
+    this.draft = this.gone = null;
     this.tell("project");
   }
 
@@ -60,7 +64,11 @@ export class Store extends EventTarget {
     this.tell("commit", at);
   }
 
-  undo() { this.step(history.undo); }
+  undo() {
+    if (this.gone && !this.draft) this.putBack(this.gone);
+    else this.step(history.undo);
+  }
+
   redo() { this.step(history.redo); }
 
   /** @param {typeof history.undo} to */
@@ -73,6 +81,7 @@ export class Store extends EventTarget {
   /** @param {import("./types.js").History} written */
   write(written) {
     const { slot } = this.current;
+    if (written !== this.current.history) this.gone = null;
     this.change({ variants: this.variants.map((v) => (v.slot === slot ? { slot, history: written } : v)) });
   }
 
@@ -81,35 +90,46 @@ export class Store extends EventTarget {
 
   /** A copy of the active variant, in the first free slot. */
   addVariant() {
-    const slot = [0, 1, 2, 3].find((i) => !this.variants.some((v) => v.slot === i));
+    const slot = this.freeSlot();
     if (slot === undefined) return;
     this.commit();
     const copy = { slot, history: history.begin(this.now) };
+    this.gone = null;
     this.change({ variants: [...this.variants, copy].sort((a, b) => a.slot - b.slot), active: slot });
     this.tell("commit", performance.now());
   }
 
-  /** Gives the variant that was removed, for those who want it back. */
+  /** Gives the variant that was removed; the project keeps the last ones, for those who want them back. */
   removeActive() {
     if (this.variants.length < 2) return null;
     this.draft = null;
     const removed = this.current, variants = this.variants.filter((v) => v !== removed);
-    this.change({ variants, active: variants[0].slot });
+    const kept = [.../** @type {Project} */ (this.project).removed, removed].slice(-SLOTS);
+    this.change({ variants, active: variants[0].slot, removed: kept });
+    this.gone = removed;
     this.tell("show");
     return removed;
   }
 
-  /** @param {Variant} variant */
+  /** A removed variant comes back, under its letter where that is free; false where there are four already. @param {Variant} variant */
   putBack(variant) {
-    if (this.variants.length >= SLOTS || this.variants.some((v) => v.slot === variant.slot)) return;
-    this.change({ variants: [...this.variants, variant].sort((a, b) => a.slot - b.slot), active: variant.slot });
+    const { removed } = /** @type {Project} */ (this.project), slot = this.freeSlot(variant.slot);
+    if (slot === undefined || !removed.includes(variant)) return false;
+    this.commit(); // a gesture that goes on ends with the variant that it was made on
+    this.gone = null;
+    this.change({ variants: [...this.variants, { ...variant, slot }].sort((a, b) => a.slot - b.slot), active: slot, removed: removed.filter((v) => v !== variant) });
     this.tell("show");
+    return true;
   }
+
+  /** The one that is preferred, or the first one that is free. @param {number} preferred */
+  freeSlot(preferred = 0) { return [preferred, 0, 1, 2, 3].find((i) => !this.variants.some((v) => v.slot === i)); }
 
   /** @param {number} slot */
   show(slot) {
     if (slot === this.active) return;
     this.commit(); // a gesture that goes on ends with the variant that it was made on
+    this.gone = null;
     this.change({ active: slot });
     this.tell("show");
   }

@@ -1,10 +1,10 @@
-// The variants as tabs, with a button for a further one and one to remove the active one.
+// The variants as tabs, with a button for a further one, one to remove the active one, and a list of the removed ones.
 
-import { el } from "./dom.js";
+import { el, option } from "./dom.js";
 import { say } from "./notice.js";
 import { SLOTS } from "./project.js";
 
-const LETTERS = "ABCD";
+export const LETTERS = "ABCD";
 
 export class Tabs {
   /** @param {HTMLElement} root @param {import("./store.js").Store} store */
@@ -17,7 +17,8 @@ export class Tabs {
   /** Only what changed is made anew: curves are edited far more often than variants. */
   draw() {
     const { root, store } = this;
-    const shown = `${store.active} of ${store.variants.map((v) => v.slot)}`;
+    const removed = store.project?.removed ?? [], names = removed.map(({ slot, history }) => `${LETTERS[slot]}: ${history.now.curve.name}, ${history.now.curve.durations[0]} s`);
+    const shown = `${store.active} of ${store.variants.map((v) => v.slot)}, without ${names}`;
     if (shown === this.shown) return;
     this.shown = shown;
     const buttons = store.variants.map(({ slot }) => this.tab(slot));
@@ -27,6 +28,10 @@ export class Tabs {
       const words = "Remove this variant";
       buttons.push(el("button", { title: words, "aria-label": words, onclick: () => this.remove() }, "×"));
     }
+    if (removed.length) {
+      const words = "Put back a variant that was removed", back = (/** @type {any} */ { target }) => this.putBack(removed[Number(target.value)]);
+      buttons.push(el("select", { id: "removed", title: words, "aria-label": words, onchange: back }, option("", "Removed…"), ...names.map((name, i) => option(String(i), name)).reverse()));
+    }
     const focused = [...root.children].indexOf(/** @type {Element} */ (document.activeElement));
     root.replaceChildren(...buttons);
     if (focused >= 0) /** @type {HTMLElement} */ (root.children[Math.min(focused, buttons.length - 1)]).focus();
@@ -34,7 +39,14 @@ export class Tabs {
 
   remove() {
     const removed = this.store.removeActive();
-    if (removed) say(`Variant ${LETTERS[removed.slot]} is removed.`, false, { words: "Put it back", act: () => this.store.putBack(removed) });
+    if (removed) say(`Variant ${LETTERS[removed.slot]} is removed.`, false, { words: "Put it back", act: () => this.putBack(removed) });
+  }
+
+  /** @param {import("./types.js").Variant} variant */
+  putBack(variant) {
+    if (!this.store.putBack(variant)) say("Four variants are the most: remove one first.");
+    this.shown = ""; // the list says nothing again
+    this.draw();
   }
 
   /** @param {number} slot */

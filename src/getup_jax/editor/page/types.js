@@ -48,6 +48,7 @@
  * @property {number} saved when, ms since 1970
  * @property {Variant[]} variants
  * @property {number} active slot
+ * @property {Variant[]} removed the last ones, so that they can be put back
  * @property {Imported[]} imported
  */
 
