@@ -16,7 +16,7 @@ from getup_jax.motion.io.curve_file import read_curve_file
 from getup_jax.motion.io.recording import forward, scaled
 
 JUDGED = """count => [...document.querySelectorAll('#curve optgroup[label=imported] option')]
-  .filter((option) => /[✓✗]/.test(option.textContent)).length === count"""
+  .filter((option) => /[✓≈✗]/.test(option.textContent)).length === count"""
 MILLIMETRE = 0.001
 
 pytestmark = BROWSER

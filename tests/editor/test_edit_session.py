@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from edit_samples import make_curve, whole_motion
 
-from getup_jax.editor import messages
 from getup_jax.editor.messages import Request
 from getup_jax.editor.session import Session
+from getup_jax.editor.verdict import verdict
 
 NUMBERS = 20 * 7 + 4  # of a frame: links, features, running
 
@@ -121,15 +121,15 @@ def test_a_page_that_leaves_is_forgotten_and_an_error_stops_no_other(session):
 def test_a_verdict_says_how_the_episode_ended(motion):
     frames = dataclasses.replace(motion.frames, running=np.ones(len(motion.time), bool))
     stays = dataclasses.replace(motion, frames=frames)
-    assert messages.verdict(stays) == "does not stand at the end"
+    assert verdict(stays) == "does not stand at the end"
     stands = dataclasses.replace(motion, scores={"success": 1.0, "stand_time_s": 2.34})
-    assert messages.verdict(stands) == "stands after 2.3 s"
+    assert verdict(stands) == "stands after 2.3 s"
     running = np.arange(len(motion.time)) < 12
     frames = dataclasses.replace(motion.frames, running=running)
     low = dataclasses.replace(motion, frames=frames, task_reward=np.full(len(running), 0.05))
-    assert messages.verdict(low).startswith("too far from the curves at 0.4 s (")
+    assert verdict(low).startswith("too far from the curves at 0.4 s (")
     head = dataclasses.replace(low, task_reward=np.full(len(running), 0.5))
-    assert messages.verdict(head) == "fails at 0.4 s: head on the floor"
+    assert verdict(head) == "fails at 0.4 s: head on the floor"
 
 
 def test_what_nobody_watches_is_simulated_between_edits_and_is_the_same(session, simulator):

@@ -5,7 +5,7 @@ import types
 import numpy as np
 import pytest
 
-from getup_jax.editor.verdict import verdict
+from getup_jax.editor.verdict import outcome, verdict
 
 STEPS = 30
 
@@ -48,3 +48,18 @@ def motion(*, success=False, reward=1.0, ended=STEPS, gap=(0.0, 0.0, 0.0), later
 )
 def test_an_episode_in_a_few_words(values, words):
     assert verdict(motion(**values)) == words
+
+
+@pytest.mark.parametrize(
+    ("values", "success", "stands"),
+    [
+        ({"success": True, "later": (-1.0, 0, 0)}, True, True),
+        ({"ended": 15, "later": (0.05, 0, 0)}, False, True),
+        ({"ended": 15, "later": (-1.0, 0, 0)}, False, False),
+        ({}, False, False),  # it ends where the curves do, and does not stand there for long enough
+    ],
+)
+def test_the_page_is_told_apart_what_stands_and_what_stands_as_asked(values, success, stands):
+    found = outcome(motion(**values))
+    assert (found["success"], found["stands"]) == (success, stands)
+    assert (", by its own way" in found["verdict"]) == (stands and not success)

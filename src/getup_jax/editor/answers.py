@@ -14,7 +14,7 @@ from getup_jax.editor.messages import MessageError, Request
 from getup_jax.editor.recordings import packed
 from getup_jax.editor.session import Session
 from getup_jax.editor.simulate import Simulator
-from getup_jax.editor.verdict import verdict
+from getup_jax.editor.verdict import outcome
 from getup_jax.motion.io.curve_file import dump, parse_text
 from getup_jax.motion.retarget.subprocess_job import Stop
 
@@ -46,10 +46,7 @@ def answer(
     motion = session.motion(request, stop.check)
     stop.check()
     if request.type == "judge":
-        success = motion.scores["success"] == 1.0
-        return json.dumps(
-            {"type": "judged", **header, "success": success, "verdict": verdict(motion)}
-        )
+        return json.dumps({"type": "judged", **header, **outcome(motion)})
     motion = dataclasses.replace(motion, curve=request.curve)  # which may be called otherwise
     character = session.simulator.character
     content = export(motion, character, request.format, request.cut, stop, progress)

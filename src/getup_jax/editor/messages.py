@@ -19,7 +19,7 @@ from getup_jax.editor.export import FORMATS
 from getup_jax.editor.simulate import Frames, Motion
 from getup_jax.editor.starts import ANYWHERE, Place
 from getup_jax.editor.takes import RATES, WHOLE, Cut
-from getup_jax.editor.verdict import verdict
+from getup_jax.editor.verdict import outcome
 from getup_jax.motion.io.curve_file import MOST_PLACES, CurveFile, is_name, parse
 from getup_jax.physics.terrain_map import REGIONS
 
@@ -137,10 +137,9 @@ def frames_message(request: Request, frames: Frames, total: int) -> bytes:
 
 def result_message(request: Request, motion: Motion, seconds: float) -> str:
     """Verdict and scores of a whole motion, and how long it took the server."""
-    success = motion.scores["success"] == 1.0
     scores = {k: v if math.isfinite(v) else None for k, v in motion.scores.items()}
     header = {"type": "result", "number": request.number, "slot": request.slot}
-    header |= {"success": success, "verdict": verdict(motion), "scores": scores}
+    header |= {**outcome(motion), "scores": scores}
     gap = math.degrees(motion.start_gap_rad)
     return json.dumps({**header, "start_gap_deg": gap, "server_s": seconds})
 

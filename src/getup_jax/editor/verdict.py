@@ -26,6 +26,14 @@ def verdict(motion: Motion) -> str:
     )
 
 
+def outcome(motion: Motion) -> dict[str, bool | str]:
+    """What a page is told; `stands` is true, too, where the body does though the episode failed."""
+    success = motion.scores["success"] == 1.0
+    ended_early = not motion.frames.running.all()
+    stands = success or (ended_early and stands_at_end(motion))
+    return {"success": success, "stands": stands, "verdict": verdict(motion)}
+
+
 def _later(motion: Motion) -> str:
     """What becomes of the body after the episode's end."""
     return "; it stands up all the same, by its own way" if stands_at_end(motion) else ""

@@ -11,8 +11,8 @@ function page() {
   results.begin({ links: ["pelvis"] });
   s.addEventListener("change", ({ detail }) => results.update(detail.at));
   results.update(0);
-  const words = () => verdictOf(results.active, results.current(s.active), wire.open).words;
-  return { s, wire, results, words };
+  const verdict = () => verdictOf(results.active, results.current(s.active), wire.open), words = () => verdict().words;
+  return { s, wire, results, verdict, words };
 }
 const last = (seconds) => (now) => edits.last(now, seconds);
 
@@ -29,6 +29,16 @@ test("a verdict is of the motion that is shown, and gone as soon as anything is 
   wire.frames(0, 2);
   wire.result(0, 2, "fails at 1.0 s: head on the floor", false);
   assert.equal(words(), "Fails at 1.0 s: head on the floor");
+});
+
+test("a motion that stands, but too far from its curves, is neither good nor bad", () => {
+  const { wire, verdict } = page(), moods = [];
+  wire.frames(0, 1);
+  for (const [success, stands] of [[true, true], [false, true], [false, false]]) {
+    wire.result(0, 1, "so", success, stands);
+    moods.push(verdict().mood);
+  }
+  assert.deepEqual(moods, ["good", "near", "bad"]);
 });
 
 test("a refused motion leaves no older one standing, and says why", () => {

@@ -44,8 +44,8 @@ export class Wire extends EventTarget {
     this.says("frames", { slot, number, first, count, total, payload });
   }
 
-  result(slot, number, words = "stands after 2.0 s", success = true) {
-    this.says("result", { slot, number, verdict: words, success, scores: {}, start_gap_deg: 0 });
+  result(slot, number, words = "stands after 2.0 s", success = true, stands = success) {
+    this.says("result", { slot, number, verdict: words, success, stands, scores: {}, start_gap_deg: 0 });
   }
 }
 

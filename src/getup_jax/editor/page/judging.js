@@ -1,5 +1,7 @@
 // What the policy makes of the imported curves: each is simulated once, after whatever is edited.
 
+import { signOf } from "./report.js";
+
 /** @import { Curve } from "./types.js" */
 
 export class Judging extends EventTarget {
@@ -43,8 +45,8 @@ export class Judging extends EventTarget {
   /** Null where the connection was lost. @param {Curve} curve */
   async judge(curve) {
     try {
-      const { success, verdict } = await this.link.ask({ type: "judge", curve });
-      return `${success ? "✓" : "✗"} ${verdict}`;
+      const said = await this.link.ask({ type: "judge", curve });
+      return `${signOf(said)} ${said.verdict}`;
     } catch (error) { return this.link.open ? `✗ ${/** @type {Error} */ (error).message}` : null; }
   }
 }

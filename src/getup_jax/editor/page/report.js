@@ -8,15 +8,21 @@ const DEGREES = 180 / Math.PI;
 /**
  * What is said of a variant: of its result where that is what is edited now, else what it waits for.
  * @param {Result | undefined} result @param {boolean} current @param {boolean} connected
- * @returns {{ words: string, mood: "good" | "bad" | "" }}
+ * @returns {{ words: string, mood: "good" | "near" | "bad" | "" }} near: it stands, but not as the curves say
  */
 export function verdictOf(result, current, connected) {
   if (!result || !current) return { words: connected ? "Simulating …" : "Not simulated: no connection", mood: "" };
   if (result.error) return { words: `Not simulated: ${result.error}`, mood: "bad" };
   if (!result.verdict) return { words: "Simulating …", mood: "" };
   const words = result.verdict.verdict;
-  return { words: words[0].toUpperCase() + words.slice(1), mood: result.verdict.success ? "good" : "bad" };
+  return { words: words[0].toUpperCase() + words.slice(1), mood: MOODS[signOf(result.verdict)] };
 }
+
+/** @type {Record<string, "good" | "near" | "bad">} */
+const MOODS = { "✓": "good", "≈": "near", "✗": "bad" };
+
+/** How an episode went, in one sign: ≈ where the body stands though it was too far from the curves. @param {{ success: boolean, stands: boolean }} verdict */
+export function signOf({ success, stands }) { return success ? "✓" : stands ? "≈" : "✗"; }
 
 /** @param {any} verdict @param {number} matchDeg */
 export function scoresOf(verdict, matchDeg) {
