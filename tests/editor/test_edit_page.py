@@ -60,6 +60,9 @@ def test_the_keyboard_moves_points_and_shift_mirror_reset_work(page_server):
         page.click("#mirror")
         assert value(page, SIDE, 2) == pytest.approx(180 - side, abs=0.11)
         assert page.input_value("#start").startswith("mirrored ")
+        assert page.inner_text("#source-name") == "Source, mirrored"
+        page.check("#source")
+        page.wait_for_selector(".recorded")
         page.click("#reset")
         assert value(page, HEIGHT, 3) == old
         assert page.input_value("#start") == "prone_half_kneel_left"

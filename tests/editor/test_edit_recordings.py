@@ -2,7 +2,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 import struct
+import subprocess
 import types
 
 import numpy as np
@@ -12,7 +14,9 @@ from getup_jax.config import PhysicsConfig
 from getup_jax.editor.answers import answer
 from getup_jax.editor.messages import MessageError, Request
 from getup_jax.editor.recordings import packed
+from getup_jax.editor.scene import mirror_links
 from getup_jax.editor.simulate import link_poses
+from getup_jax.editor.site import PAGE
 from getup_jax.motion.clips import Clip
 from getup_jax.motion.retarget.subprocess_job import Stop
 from getup_jax.physics.character import load_character
@@ -64,3 +68,34 @@ def test_a_page_is_sent_the_reference_motion_that_it_asks_for():
     assert header["recordings"][0]["total"] == len(rows(found[4 + length :])) == 4
     with pytest.raises(MessageError, match="expected a reference motion, got 'walk'"):
         answer(dataclasses.replace(request, name="walk"), session({}), Stop())
+
+
+NODE = shutil.which("node")
+MIRROR = """
+import { mirrored } from "%s";
+const { frames, ...recording } = JSON.parse(process.argv[1]), link = JSON.parse(process.argv[2]);
+const image = mirrored({ ...recording, frames: Float32Array.from(frames) }, link);
+console.log(JSON.stringify([...image.frames]));
+"""
+
+
+@pytest.mark.skipif(NODE is None, reason="needs node to run the page's module")
+def test_the_mirror_image_that_the_page_makes_is_that_of_the_character():
+    random = np.random.default_rng(0)
+    turn = random.normal(size=(3, 4))
+    root = np.c_[random.normal(size=(3, 3)), turn / np.linalg.norm(turn, axis=1)[:, None]]
+    clip = Clip("any", 30.0, np.c_[root, random.uniform(-1, 1, (3, CHARACTER.num_joints))])
+    image = dataclasses.replace(clip, qpos=CHARACTER.mirror(clip.qpos))
+    heads, payload = packed([clip, image], CHARACTER)
+    found, wanted = np.split(rows(payload), 2)
+    head = json.dumps({**heads[0], "frames": found.ravel().tolist()})
+    links = json.dumps(mirror_links(CHARACTER.link_names))
+    script = MIRROR % (PAGE / "motion_recording.js").as_uri()
+    command = [NODE, "--input-type=module", "-e", script, head, links]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    made = np.array(json.loads(done.stdout)).reshape(wanted.shape)
+    np.testing.assert_allclose(made[:, -3:], wanted[:, -3:], atol=1e-3)  # m, degrees
+    made, wanted = (x[:, :-3].reshape(3, -1, 7) for x in (made, wanted))
+    np.testing.assert_allclose(made[..., :3], wanted[..., :3], atol=1e-5)
+    same_turn = np.abs((made[..., 3:] * wanted[..., 3:]).sum(axis=-1))
+    np.testing.assert_allclose(same_turn, 1.0, atol=1e-5)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -53,6 +55,7 @@ def describe(simulator: Simulator, loaded: LoadedPolicy) -> dict[str, Any]:
         "mirror": {
             "joint": simulator.character.mirror_joint.tolist(),
             "sign": simulator.character.mirror_sign.tolist(),
+            "link": mirror_links(simulator.character.link_names),
         },
         "mirrored": None if starts.places else curve_file.MIRRORED,
         "curves": [curve.plain() for curve in library_curves(simulator)],
@@ -67,6 +70,15 @@ def describe(simulator: Simulator, loaded: LoadedPolicy) -> dict[str, Any]:
         "terrain": {"regions": REGIONS, "places": starts.places} if starts.places else None,
         "formats": missing_extras(),
     }
+
+
+def mirror_links(names: Sequence[str]) -> list[int]:
+    """The number of every link's image on the other side; one without an image has its own."""
+    swapped = [re.sub(r"_([lr])(?=_|$)", lambda m: "_" + "rl"["lr".index(m[1])], n) for n in names]
+    return [
+        names.index(image if image in names else own)
+        for image, own in zip(swapped, names, strict=True)
+    ]
 
 
 def library_curves(simulator: Simulator) -> list[CurveFile]:

@@ -142,8 +142,11 @@ export function mirror(now, mirrored, mirror) {
   return { ...now, curve: other, keys };
 }
 
+/** Of a position and a quaternion (wxyz) in the plane y = 0. */
+export const POSE_SIGN = [1, -1, 1, 1, -1, 1, -1];
+
 /** @param {number[]} pose @param {Mirror} mirror */
-function mirrorPose(pose, { joint, sign }) {
-  const root = [1, -1, 1, 1, -1, 1, -1].map((s, i) => s * pose[i]);
+export function mirrorPose(pose, { joint, sign }) {
+  const root = POSE_SIGN.map((s, i) => s * pose[i]);
   return [...root, ...joint.map((j, i) => sign[i] * pose[7 + j])];
 }

@@ -177,6 +177,7 @@ function show() {
   write($("project"), store.project?.name ?? "Project");
   $("apart-label").hidden = store.variants.length < 2;
   $("source").disabled = !sources.any;
+  write($("source-name"), sources.side === "mirrored" ? "Source, mirrored" : "Source");
   showReport();
 }
 

@@ -1,9 +1,13 @@
 // The motions behind the curves: kept with what was imported, asked for where the library has it.
 
 import { sameCurve } from "./content.js";
+import { mirrorPose } from "./edits.js";
 import { recordings } from "./files.js";
+import { mirrored } from "./motion_recording.js";
 
-/** @import { Recording } from "./types.js" */
+/** @import { Curve, Recording } from "./types.js" */
+
+const SAME = 1e-6; // of two poses: they are stored with as many digits
 
 export class Sources extends EventTarget {
   /** @param {import("./link.js").Link} link @param {import("./store.js").Store} store */
@@ -13,21 +17,45 @@ export class Sources extends EventTarget {
     this.store = store;
     /** @type {Set<string>} names of the library's clips */
     this.library = new Set();
+    /** @type {import("./edits.js").Mirror & { link: number[], word: string | null }} word: before the name of a mirrored start */
+    this.mirror = { joint: [], sign: [], link: [], word: null };
     /** @type {Map<string, Recording | null>} of the library; null: on its way */
     this.known = new Map();
     this.wanted = false;
   }
 
-  /** Whether there is one behind the curve at hand; none where it starts elsewhere, as its mirror image does. */
-  get any() {
-    if (!this.store.project) return false;
-    const { curve, reference } = this.store.now;
-    const same = curve.start === reference.start && JSON.stringify(curve.pose) === JSON.stringify(reference.pose);
-    return same && Boolean(this.own?.recording || this.library.has(reference.name));
+  /** Which one is behind the curve at hand: the motion itself, or its mirror image; null where the curve starts elsewhere. @returns {"itself" | "mirrored" | null} */
+  get side() {
+    if (!this.store.project) return null;
+    const { curve, reference } = this.store.now, { own } = this;
+    if (own?.recording) return this.sideOf(curve, own.curve);
+    return this.library.has(reference.name) ? this.sideOf(curve, { ...reference, start: this.plainStart(reference) }) : null;
+  }
+
+  get any() { return this.side !== null; }
+
+  /** @param {Curve} curve @param {Curve} original */
+  sideOf(curve, original) {
+    if (curve.pose && original.pose) {
+      if (alike(curve.pose, original.pose)) return "itself";
+      return alike(curve.pose, mirrorPose(original.pose, this.mirror)) ? "mirrored" : null;
+    }
+    if (curve.pose || original.pose || this.plainStart(curve) !== this.plainStart(original)) return null;
+    return curve.start === original.start ? "itself" : "mirrored";
+  }
+
+  /** The start's name without the word that says that it is mirrored. @param {Curve} curve */
+  plainStart({ start }) {
+    const { word } = this.mirror;
+    return word !== null && start.startsWith(word) ? start.slice(word.length) : start;
   }
 
   /** @returns {Recording | null} */
-  get recording() { return this.any ? this.own?.recording ?? this.known.get(this.store.now.reference.name) ?? null : null; }
+  get recording() {
+    const { side } = this, found = side && (this.own?.recording ?? this.known.get(this.store.now.reference.name));
+    if (!found) return null;
+    return side === "mirrored" ? mirrored(found, this.mirror.link) : found;
+  }
 
   /** What was imported as the curve at hand; several files may have one name. */
   get own() {
@@ -48,3 +76,6 @@ export class Sources extends EventTarget {
     } catch { this.known.delete(name); }
   }
 }
+
+/** @param {number[]} a @param {number[]} b */
+function alike(a, b) { return a.length === b.length && a.every((x, i) => Math.abs(x - b[i]) < SAME); }

@@ -34,6 +34,7 @@ export class Stage {
   know(scene) {
     this.scene = scene;
     this.sources.library = new Set(scene.starts.map((/** @type {any} */ s) => s.name));
+    this.sources.mirror = { ...scene.mirror, word: scene.mirrored };
   }
 
   /** Makes the view; false where the browser has no WebGL. */
@@ -108,7 +109,7 @@ export class Stage {
     const share = Math.min(player.time / duration(this.store.now), 1), first = poseAt(recording, 0), begin = motion.pose(0);
     const { x, y } = view.bodies.get(this.store.active)?.group.position ?? { x: 0, y: 0 }; // aside, too
     view.source.group.position.set(x + begin[0] - first[0], y + begin[1] - first[1], 0);
-    view.poseSource(`${this.store.now.reference.name} ${Math.round(share * recording.total)}`, () => poseAt(recording, share));
+    view.poseSource(`${this.store.now.reference.name} ${this.sources.side} ${Math.round(share * recording.total)}`, () => poseAt(recording, share));
   }
 
   /** @param {import("./motion.js").Motion | null} motion @param {(motion: any) => number} frame */
