@@ -75,6 +75,20 @@ def opened(address: str, profile: Path | None = None, **context: Any) -> Iterato
     assert not problems, problems
 
 
+@contextlib.contextmanager
+def opened_after(address: str, script: str) -> Iterator[Any]:
+    """The page in a browser that a script has changed before."""
+    with opened(address) as first:
+        context = first.context.browser.new_context()
+        context.add_init_script(script)
+        page, problems = context.new_page(), []
+        page.on("pageerror", lambda error: problems.append(str(error)))
+        page.goto(address)
+        page.wait_for_selector("body[data-shown]", timeout=120_000)
+        yield page
+        assert not problems
+
+
 def drag(page: Any, panel: str, point: int, pixels: int) -> None:
     """Drag a control point up (positive) or down, in some steps as a hand does."""
     box = page.locator(f'[aria-label="{panel}"] [data-point="{point}"]').bounding_box()

@@ -7,7 +7,7 @@ import json
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from browser import BROWSER, HEIGHT, drag, edited, opened, saved, says, shot, value
+from browser import BROWSER, HEIGHT, drag, edited, opened, opened_after, saved, says, shot, value
 
 from getup_jax.cli import main
 from getup_jax.motion.getup import curves
@@ -156,6 +156,29 @@ def test_a_film_is_large_says_how_far_it_is_and_can_be_cancelled(page_server, tm
         assert film.get_meta_data()["fps"] == 30
         assert film.get_data(0).shape == (1080, 1920, 3)
         assert 5 <= film.count_frames() <= 10  # a twenty-fifth of 6.4 s
+
+
+_NO_WEBGL = """
+const context = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+  return kind.startsWith("webgl") ? null : context.call(this, kind, ...more);
+};
+"""
+
+
+def test_without_webgl_a_picture_is_refused_with_a_reason_and_all_else_works(page_server, tmp_path):
+    with opened_after(page_server[0], _NO_WEBGL) as page:
+        says(page, "veil", "no WebGL")
+        page.click("text=+ variant")
+        edited(page, lambda: drag(page, HEIGHT, 4, 20))
+        page.click("#export")
+        page.select_option("#format", "png")
+        page.click("#export-go")
+        says(page, "toast", "There is no picture: this browser draws no 3-D view")
+        page.click("#export-cancel")
+        name = page.input_value("#name")
+        assert saved(page, "csv", tmp_path).name == f"{name}_B.csv"
+        assert saved(page, "#save", tmp_path).name == f"{name}_B.yaml"
 
 
 def test_a_file_that_is_no_curve_file_is_refused_with_a_reason(page_server, tmp_path):

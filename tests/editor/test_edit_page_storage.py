@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
-from typing import Any
-
 import pytest
-from browser import BROWSER, HEIGHT, drag, edited, judged, opened, says, value
+from browser import BROWSER, HEIGHT, drag, edited, judged, opened_after, says, value
 
 pytestmark = BROWSER
 
@@ -31,20 +27,6 @@ window.put = IDBObjectStore.prototype.put;
 window.fill = () => { IDBObjectStore.prototype.put = () => { throw new DOMException("full"); }; };
 window.empty = () => { IDBObjectStore.prototype.put = window.put; };
 """
-
-
-@contextlib.contextmanager
-def opened_after(address: str, script: str) -> Iterator[Any]:
-    """The page in a browser that a script has changed before."""
-    with opened(address) as first:
-        context = first.context.browser.new_context()
-        context.add_init_script(script)
-        page, problems = context.new_page(), []
-        page.on("pageerror", lambda error: problems.append(str(error)))
-        page.goto(address)
-        page.wait_for_selector("body[data-shown]", timeout=60_000)
-        yield page
-        assert not problems
 
 
 @pytest.mark.parametrize(

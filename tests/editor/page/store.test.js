@@ -130,6 +130,15 @@ test("the last four removed variants are kept and come back with their undo, und
   assert.deepEqual(s.project.removed, removed.slice(2));
 });
 
+test("files of several variants have the variant's letter, the one of a single variant has none", () => {
+  const s = store();
+  assert.equal(s.fileName("my.rise.yaml"), "my.rise.yaml");
+  s.addVariant();
+  assert.equal(s.fileName("my.rise.yaml"), "my.rise_B.yaml");
+  s.show(0);
+  assert.equal(s.fileName("my.rise.yaml"), "my.rise_A.yaml");
+});
+
 test("the span is that of the longest variant, so that no ghost is cut off", () => {
   const s = store();
   s.commit(last(9));

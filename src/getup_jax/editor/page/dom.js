@@ -30,6 +30,13 @@ export function types(target) {
   return tagName === "TEXTAREA" || (tagName === "INPUT" && (type === "text" || type === "search" || type === "number"));
 }
 
+/** Whether a key that is pressed there chooses from a list: letters, numbers and the ends; the space bar where it was reached by Tab. @param {EventTarget | null} target @param {string} key */
+export function chooses(target, key) {
+  const list = /** @type {any} */ (target);
+  if (list?.tagName !== "SELECT") return false;
+  return key === " " ? list.matches(":focus-visible") : key.length === 1 || ["Home", "End", "Shift+ArrowLeft", "Shift+ArrowRight"].includes(key);
+}
+
 /** @param {string} name @param {BlobPart} content */
 export function download(name, content) {
   const anchor = el("a", { href: URL.createObjectURL(new Blob([content])), download: name });

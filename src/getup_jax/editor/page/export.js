@@ -74,7 +74,8 @@ export class Exports {
 
   async go() {
     const request = this.request();
-    if (request.format === "png") return this.still(request.name);
+    const name = this.store.fileName(`${request.name}.${request.format}`);
+    if (request.format === "png") return this.still(name);
     const button = $("export-go");
     button.disabled = true;
     $("export-progress").hidden = false;
@@ -82,8 +83,8 @@ export class Exports {
       const answer = this.link.ask(request);
       this.number = this.link.number;
       const file = await answer;
-      download(file.name, file.payload);
-      say(`${file.name} exported`);
+      download(name, file.payload);
+      say(`${name} exported`);
     } catch (error) { say(/** @type {Error} */ (error).message, true); }
     this.number = null;
     if (button.isConnected) $("dialog").close();
@@ -92,8 +93,10 @@ export class Exports {
   /** @param {string} name */
   async still(name) {
     const picture = await this.model.still();
-    if (picture) download(`${name}.png`, picture);
+    if (!picture) return say("There is no picture: this browser draws no 3-D view, since it has no WebGL, or lost it. The other formats need none.", true);
+    download(name, picture);
     $("dialog").close();
+    say(`${name} exported`);
   }
 
   /** Ends what is under way, or closes. */

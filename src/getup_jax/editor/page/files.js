@@ -39,10 +39,11 @@ export class Files {
   }
 
   async save() {
+    const { curve } = this.store.now, name = this.store.fileName(`${curve.name}.yaml`);
     try {
-      const file = await this.link.ask({ type: "save", curve: { ...this.store.now.curve, ...this.to.ground() } });
-      download(file.name, file.payload);
-      say(`${file.name} saved`);
+      const file = await this.link.ask({ type: "save", curve: { ...curve, ...this.to.ground() } });
+      download(name, file.payload);
+      say(`${name} saved`);
     } catch (error) { say(/** @type {Error} */ (error).message, true); }
   }
 

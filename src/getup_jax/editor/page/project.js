@@ -11,7 +11,7 @@ import { FEATURES, POINTS } from "./spline.js";
 
 export const FORMAT = 1;
 export const SUFFIX = ".getup.json";
-export const SLOTS = 4;
+export const SLOTS = 4, LETTERS = "ABCD"; // of the variants
 export const MOST_IMPORTED = 200, MOST_LETTERS = 200;
 const MOST_KEYS = 1000, MOST_STEPS = 200;
 

@@ -1,6 +1,6 @@
 // All keys, wherever the focus is, but for what is being typed; and the list of them.
 
-import { $, el, types } from "./dom.js";
+import { $, chooses, el, types } from "./dom.js";
 
 /** @typedef {{ keys: string, words: string, press: string[], act: () => void }} Shortcut press: as `named` gives them */
 
@@ -16,10 +16,10 @@ export function listen(shortcuts) {
   addEventListener("keydown", (event) => {
     const name = named(event), act = table.get(name);
     if (!act || event.defaultPrevented || $("dialog").open) return;
-    if (types(event.target) && name !== "Ctrl+s") return;
-    // a button that was reached by Tab is pressed by the space bar, a list opens
+    if ((types(event.target) && name !== "Ctrl+s") || chooses(event.target, name)) return;
+    // a button that was reached by Tab is pressed by the space bar
     const target = /** @type {Element} */ (event.target);
-    if (name === " " && target.matches("button:focus-visible, select:focus-visible, input[type=checkbox]:focus-visible")) return;
+    if (name === " " && target.matches("button:focus-visible, input[type=checkbox]:focus-visible")) return;
     event.preventDefault();
     act();
   });
@@ -31,6 +31,10 @@ export function listen(shortcuts) {
   addEventListener("pointerup", (event) => {
     const target = /** @type {Element} */ (event.target).closest?.("button, input[type=range], input[type=checkbox]");
     if (target && !$("dialog").open) /** @type {HTMLElement} */ (target).blur();
+  });
+  addEventListener("change", (event) => {
+    const target = /** @type {HTMLElement} */ (event.target);
+    if (target.matches("select:not(:focus-visible)") && !$("dialog").open) target.blur();
   });
 }
 

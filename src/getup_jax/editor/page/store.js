@@ -6,7 +6,7 @@
 
 import { duration } from "./content.js";
 import * as history from "./history.js";
-import { MOST_IMPORTED, MOST_LETTERS, SLOTS } from "./project.js";
+import { LETTERS, MOST_IMPORTED, MOST_LETTERS, SLOTS } from "./project.js";
 
 /** @import { Content, Imported, Project, Variant } from "./types.js" */
 
@@ -26,6 +26,9 @@ export class Store extends EventTarget {
   get active() { return this.project?.active ?? 0; }
   get current() { return /** @type {Variant} */ (this.variants.find((v) => v.slot === this.active)); }
   get now() { return this.draft ?? this.current.history.now; }
+
+  /** The name of a file of the active variant: with its letter, where there are several. @param {string} file */
+  fileName(file) { return this.variants.length > 1 ? file.replace(/(\.[^.]*)$/, `_${LETTERS[this.active]}$1`) : file; }
 
   get undoable() { return this.gone !== null || this.current.history.past.length > 0; }
 

@@ -2,9 +2,7 @@
 
 import { el, option } from "./dom.js";
 import { say } from "./notice.js";
-import { SLOTS } from "./project.js";
-
-export const LETTERS = "ABCD";
+import { LETTERS, SLOTS } from "./project.js";
 
 export class Tabs {
   /** @param {HTMLElement} root @param {import("./store.js").Store} store */
