@@ -101,6 +101,17 @@ def test_a_frame_of_the_source_is_a_pose_to_wish_for(page_server):
         page.wait_for_selector(".recorded")
         edited(page, lambda: page.select_option("#pose", label=pose))
         assert value(page, HEIGHT, 4) == pytest.approx(old, abs=0.08)
+        # the same pose for another variant, at another time
+        assert page.locator("#pose option[value=copied]").is_disabled()
+        page.select_option("#pose", value="copy-source")
+        says(page, "toast", "copied")
+        page.uncheck("#source")
+        edited(page, lambda: page.click("text=+ variant"))
+        edited(page, lambda: page.select_option("#curve", label="supine_situp_squat"))
+        seek(page, 0.6)
+        edited(page, lambda: page.select_option("#pose", value="copied"))
+        heights = [value(page, HEIGHT, i) for i in range(count(page))]
+        assert min(abs(h - old) for h in heights[1:4]) < 0.08, heights
 
 
 def test_time_and_value_are_typed_and_read(page_server):
@@ -130,7 +141,9 @@ def test_two_fingers_zoom_the_curves_and_not_the_page(page_server):
     with opened(page_server[0], viewport=viewport, has_touch=True, is_mobile=True) as page:
         page.click("#hint-close")
         page.locator(f'[aria-label="{HEIGHT}"]').scroll_into_view_if_needed()
+        shot(page, "narrow")
         frame, ticks = box(page), shown_ticks(page)
+        assert room(page) > 4, "the points lie on each other"
         before = page.evaluate("[visualViewport.scale, scrollY]")
         touch = page.context.new_cdp_session(page)
         middle, level = frame["x"] + 0.4 * frame["width"], frame["y"] + 0.5 * frame["height"]
@@ -151,10 +164,96 @@ def test_two_fingers_zoom_the_curves_and_not_the_page(page_server):
         assert page.is_disabled("#undo"), "the fingers edited something"
 
 
+def room(page) -> float:
+    """The least distance between the edges of two points beside each other (px)."""
+    return page.locator(f'[aria-label="{HEIGHT}"] .point').evaluate_all(
+        """dots => Math.min(...dots.slice(1).map((dot, i) => dot.cx.baseVal.value
+          - dots[i].cx.baseVal.value - 2 * parseFloat(getComputedStyle(dot).r) - 2))"""
+    )
+
+
 def shown_ticks(page) -> list[float]:
     """Times along the axis of the first panel."""
     texts = page.locator(f'[aria-label="{HEIGHT}"] text[text-anchor="middle"]').all_text_contents()
     return [float(text) for text in texts]
+
+
+def test_curves_are_zoomed_moved_and_shown_whole_again(page_server):
+    with opened(page_server[0]) as page:
+        page.click("#play")
+        frame, whole = box(page), shown_ticks(page)
+        levels = page.locator(f'[aria-label="{HEIGHT}"] text[text-anchor="end"]').count()
+        x, y = frame["x"] + frame["width"] / 2, frame["y"] + frame["height"] / 2
+        page.mouse.move(x, y)
+        page.mouse.wheel(0, -600)
+        drawn(page)
+        zoomed = shown_ticks(page)
+        assert np.ptp(zoomed) < 0.6 * np.ptp(whole)
+        page.keyboard.down("Shift")
+        page.mouse.wheel(0, 300)
+        page.keyboard.up("Shift")
+        drawn(page)
+        later = shown_ticks(page)
+        assert later[0] > zoomed[0], "the wheel with Shift does not move them"
+        page.keyboard.down("Alt")
+        page.mouse.down()
+        page.mouse.move(x + 120, y, steps=3)
+        page.mouse.up()
+        drawn(page)
+        assert shown_ticks(page)[0] < later[0], "a drag with Alt does not move them"
+        page.mouse.wheel(0, -900)
+        page.keyboard.up("Alt")
+        drawn(page)
+        seen = page.locator(f'[aria-label="{HEIGHT}"] text[text-anchor="end"]').count()
+        assert seen < levels, "the wheel with Alt does not zoom the values"
+        page.keyboard.press("f")
+        drawn(page)
+        assert shown_ticks(page) == whole
+        assert page.is_disabled("#undo"), "to look at the curves edits nothing"
+
+
+def test_points_snap_and_what_the_policy_cannot_follow_is_shown(page_server):
+    def dragged(right: float, up: float) -> tuple[float, float]:
+        """Time (frames) and value (hundredths of a metre) of a point that is being dragged."""
+        page.mouse.move(x + right, y - up)
+        drawn(page)
+        time_s, height = (float(page.input_value(f"#key-{name}")) for name in ("time", "value"))
+        return 30 * time_s, 100 * height
+
+    def off(numbers) -> float:
+        """How far from whole numbers."""
+        return float(np.abs(np.array(numbers) - np.round(numbers)).max())
+
+    places = ((17, 23), (19, 27), (23, 31), (26, 33))
+    with opened(page_server[0]) as page:
+        page.click("#play")
+        lines = page.locator(f'[aria-label="{HEIGHT}"] .fitted')
+        assert lines.count() == 0
+        assert page.locator(".error").count() == 3
+        point = page.locator(f'[aria-label="{HEIGHT}"] [data-point="4"]').bounding_box()
+        x, y = point["x"] + point["width"] / 2, point["y"] + point["height"] / 2
+        page.mouse.move(x, y)
+        page.mouse.down()
+        assert off([dragged(*place) for place in places]) < 0.03  # the field has milliseconds
+        page.keyboard.down("Control")
+        assert off([dragged(*place) for place in places]) > 0.1, "Ctrl does not free it"
+        page.keyboard.up("Control")
+        page.keyboard.press("Escape")
+        page.mouse.up()
+        # a step between two of the nine control points is more than they can follow
+        page.mouse.dblclick(x + 8, y - 40)
+        page.mouse.dblclick(x + 14, y + 40)
+        drawn(page)
+        assert lines.count() == 1
+        assert "nine control points" in lines.inner_html()
+        for _ in range(2):
+            page.keyboard.press("Control+z")
+        drawn(page)
+        assert lines.count() == 0
+        edited(page, lambda: page.select_option("#start", value="supine_situp_squat"))
+        judged(page)
+        drawn(page)
+        assert page.locator(".lost").count() > 0
 
 
 @contextlib.contextmanager

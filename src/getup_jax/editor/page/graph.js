@@ -41,6 +41,8 @@ export class Graph {
     this.frames = false;
     /** @type {Clip | null} */
     this.clip = null;
+    /** @type {{ name: string, values: Partial<Record<Feature, number>> } | null} that was copied, for any variant */
+    this.pose = null;
     this.onSelect = () => {};
     this.panels = FEATURES.map((feature, index) => new Panel(root, this, feature, index));
     new ResizeObserver(() => this.draw()).observe(root);

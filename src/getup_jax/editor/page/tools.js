@@ -8,6 +8,7 @@ import { clamp, KINDS } from "./features.js";
 import { featuresAt } from "./motion_recording.js";
 import { say } from "./notice.js";
 import { POSES } from "./poses.js";
+import { LETTERS } from "./project.js";
 import * as selection from "./selection.js";
 import { FEATURES } from "./spline.js";
 import { set } from "./svg.js";
@@ -18,6 +19,8 @@ import { set } from "./svg.js";
 const PASSING = [
   ["auto", "Auto", "Bends evenly through the point"], ["flat", "Flat", "Level at the point: neither rises nor falls"], ["linear", "Linear", "Straight to the points beside it"],
 ];
+
+const NOTHING = "paste pose: none is copied yet";
 
 export class Tools {
   /** @param {HTMLElement} root @param {import("./graph.js").Graph} graph @param {import("./player.js").Player} player */
@@ -122,13 +125,15 @@ export class Tools {
   fillPoses(scene) {
     const starts = scene.starts.map((/** @type {any} */ s, /** @type {number} */ i) => option(`s${i}`, s.name));
     const poses = POSES.map(({ name }, i) => option(`p${i}`, name));
-    $("pose").replaceChildren(option("", "Pose…"), group("poses", poses), group("this motion", [option("now", "as the body is at the time at hand"), option("source", "as its source is at the time at hand")]), group("lying as", starts));
+    $("pose").replaceChildren(option("", "Pose…"), group("poses", poses), group("this motion", [option("now", "as the body is at the time at hand"), option("source", "as its source is at the time at hand")]),
+      group("for another variant or time", [option("copy-now", "copy pose: the body's at the time at hand"), option("copy-source", "copy pose: its source's at the time at hand"), option("copied", NOTHING, true)]), group("lying as", starts));
     this.scene = scene;
   }
 
   pose() {
     const select = $("pose"), value = select.value;
     select.value = "";
+    if (value.startsWith("copy-")) return this.copyPose(value.slice(5));
     const values = this.valuesOf(value);
     if (!values) return;
     const [from, to] = this.player.range ? this.part : [this.at, this.at];
@@ -136,6 +141,17 @@ export class Tools {
     this.store.commit((now) => edits.wish(now, from, to, values, pose && { name: pose.name, contacts: pose.contacts }));
     this.graph.select({});
     say("Height and angles are wished there. What touches the ground is the policy's choice: the report says what was reached.");
+  }
+
+  /** The pose at the time at hand, to be pasted at another one, here or in another variant. @param {string} of "now": the body's; "source" */
+  copyPose(of) {
+    const values = this.valuesOf(of);
+    if (!values) return;
+    const name = `${LETTERS[this.store.active]} at ${this.player.time.toFixed(2)} s`;
+    this.graph.pose = { name, values };
+    const paste = $("pose").querySelector("option[value=copied]");
+    Object.assign(paste, { disabled: false, textContent: `paste pose: ${name}` });
+    say(`The pose of ${name} is copied; paste it with the same list.`);
   }
 
   /** @param {string} value of an option @returns {Partial<Record<Feature, number>> | null} */
@@ -147,6 +163,7 @@ export class Tools {
       const frame = this.player.frame(motion, this.graph.model.controlDt);
       return Object.fromEntries(FEATURES.map((f, i) => [f, motion.features[i][frame]]));
     }
+    if (value === "copied") return this.graph.pose?.values ?? null;
     if (value === "source") return this.sourceValues();
     if (value[0] !== "s") return null;
     const { first } = this.scene.starts[Number(value.slice(1))];
