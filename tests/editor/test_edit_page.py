@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 
 import numpy as np
@@ -102,8 +103,14 @@ def test_the_strip_of_poses_follows_the_motion(page_server):
         columns = bodies.any(axis=0)
         assert (np.diff(columns.astype(int)) == 1).sum() >= 5, "expected seven poses side by side"
         number = page.get_attribute("#strip", "data-drawn")
-        edited(page, lambda: drag(page, HEIGHT, 4, -60))
-        page.wait_for_selector(f'#strip:not([data-drawn="{number}"])')
+        assert page.locator("#strip.stale").count() == 0
+        box = page.locator(f'[aria-label="{HEIGHT}"] [data-point="4"]').bounding_box()
+        page.mouse.move(box["x"] + 6, box["y"] + 6)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 6, box["y"] + 66, steps=3)
+        page.wait_for_selector("#strip.stale")  # as long as the motion is another one
+        edited(page, page.mouse.up)
+        page.wait_for_selector(f'#strip:not(.stale):not([data-drawn="{number}"])')
         assert np.abs(picture(page, "#strip") - first).max() > 0.1
 
 
@@ -134,6 +141,51 @@ def test_a_variant_stays_as_a_ghost_and_dark_is_readable(page_server):
         assert page.locator("[role=tab]").count() == 1
         drawn(page)
         assert page.locator(".ghost").count() == 0
+
+
+def test_the_view_looks_from_standard_directions(page_server):
+    def seen() -> np.ndarray:
+        """The view, once it no longer changes."""
+        before = picture(page, "#view")
+        for _ in range(20):
+            page.wait_for_timeout(400)
+            now = picture(page, "#view")
+            if np.array_equal(now, before):
+                return now
+            before = now
+        raise AssertionError("the view does not come to rest")
+
+    with opened(page_server[0]) as page:
+        page.click("#play")
+        page.keyboard.press("End")
+        views = {}
+        for key in "0137":
+            page.keyboard.press(key)
+            views[key] = seen()
+        for one, other in itertools.combinations(views, 2):
+            assert np.abs(views[one] - views[other]).mean() > 0.003, (one, other)
+        page.select_option("#standard", value="front")
+        assert np.abs(seen() - views["1"]).mean() < 0.001
+        assert page.input_value("#standard") == ""
+
+
+def test_help_lists_every_key_and_the_hint_stays_away_once_it_was_read(page_server):
+    with opened(page_server[0]) as page:
+        assert page.is_visible("#hint")
+        page.click("#hint-close")
+        page.reload()
+        page.wait_for_selector("body[data-shown]", timeout=60_000)
+        assert page.is_hidden("#hint")
+        before = page.inner_text("#play")
+        page.keyboard.press("?")
+        listed = page.locator("#help-list dt").all_inner_texts()
+        assert {"Space", "I O", "Ctrl+C, Ctrl+V", "H", "F", "0 1 3 7", "?", "Esc"} <= set(listed)
+        assert page.locator("#help-list dd").count() == len(listed)
+        page.keyboard.press("Space")  # presses the dialog's own button
+        assert page.inner_text("#play") == before
+        if page.locator("#dialog").evaluate("dialog => dialog.open"):
+            page.keyboard.press("Escape")
+        assert not page.locator("#dialog").evaluate("dialog => dialog.open")
 
 
 def test_a_lost_connection_keeps_the_edits_and_goes_on_with_them():

@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from browser import BROWSER, HEIGHT, drag, edited, opened, opened_after, saved, says, shot, value
+from browser import (
+    BROWSER,
+    HEIGHT,
+    drag,
+    edited,
+    opened,
+    opened_after,
+    picture,
+    saved,
+    says,
+    shot,
+    value,
+)
+from glb_reading import link_places, read_glb
+from matplotlib.image import imread
 
 from getup_jax.cli import main
 from getup_jax.motion.getup import curves
@@ -58,9 +73,28 @@ def curve_at(curve, share: float) -> float:
 
 
 def test_exports_hold_the_motion_that_is_shown(page_server, tmp_path):
+    glb = importlib.util.find_spec("pygltflib") is not None  # the extra `glb`
     with opened(page_server[0], accept_downloads=True) as page:
         edited(page, lambda: drag(page, HEIGHT, 4, -20))
-        files = {kind: saved(page, kind, tmp_path) for kind in ("bvh", "npz", "csv")}
+        kinds = ("bvh", "npz", "csv", *(("glb",) if glb else ()), "png")
+        files = {kind: saved(page, kind, tmp_path) for kind in kinds}
+        seconds = float(page.input_value("#seconds"))
+        page.click("#export")
+        page.select_option("#format", "bvh")
+        page.select_option("#part", "rise")
+        page.select_option("#rate", "60")
+        with page.expect_download(timeout=60_000) as download:
+            page.click("#export-go")
+        rise = tmp_path / "rise.bvh"
+        download.value.save_as(rise)
+        page.wait_for_timeout(300)
+        assert np.ptp(picture(page, "#view")) > 0.3, "the view is empty after the picture"
+    still = imread(files["png"])
+    assert still.shape[:2] == (1080, 1920)
+    assert np.ptp(still[..., :3]) > 0.3, "the picture is empty"
+    without = read_bvh(rise)
+    assert without.fps == pytest.approx(60, rel=1e-5)
+    assert without.num_frames == int(60 * seconds + 1e-6) + 1  # no standing at the end
     recording = scaled(read_bvh(files["bvh"]), 0.01)
     with np.load(files["npz"]) as data:
         links = data["link_position"]
@@ -71,6 +105,10 @@ def test_exports_hold_the_motion_that_is_shown(page_server, tmp_path):
     wanted = links[..., [1, 0, 2]] * [1.0, -1.0, 1.0]
     assert np.abs(position[1:, order] - wanted).max() < MILLIMETRE  # the first is at 0 s
     assert len(files["csv"].read_text().splitlines()) == recording.num_frames
+    if glb:
+        places = link_places(read_glb(files["glb"].read_bytes()))
+        found = np.stack([places[name][1:] for name in names], axis=1)
+        assert np.abs(found - links).max() < MILLIMETRE
 
 
 def test_a_motion_file_gives_its_curve_and_start_pose(page_server, tmp_path):
@@ -117,16 +155,19 @@ def test_a_batch_of_imports_can_be_cancelled(page_server, tmp_path):
 def test_what_was_imported_is_judged_one_by_one(page_server, tmp_path):
     with opened(page_server[0], accept_downloads=True) as page:
         stands = saved(page, "npz", tmp_path)
-        page.set_input_files("#file-motion", str(stands))
+        other = stands.with_name("other take.npz")
+        other.write_bytes(stands.read_bytes())
+        page.set_input_files("#file-motion", [str(stands), str(other)])
         imported = page.locator("#curve optgroup[label=imported] option")
-        page.wait_for_function(JUDGED, arg=1)
-        assert f"{stands.name}, " in imported.first.inner_text()
-        assert "✓ stands after" in imported.first.inner_text()
+        page.wait_for_function(JUDGED, arg=2)
+        for file, text in zip((stands, other), imported.all_inner_texts(), strict=True):
+            assert f"({file.name}, " in text
+            assert "✓ stands after" in text
         kept = page.locator("body[data-saved]")
         kept.wait_for()
         page.reload()
         page.wait_for_selector("body[data-shown]")
-        page.wait_for_function(JUDGED, arg=1)  # a project's, when it is opened
+        page.wait_for_function(JUDGED, arg=2)  # a project's, when it is opened
 
 
 @pytest.mark.filterwarnings("ignore:os.fork")  # of the reader's own ffmpeg

@@ -6,7 +6,7 @@ import { asideOf, cameraAt, rowDistance } from "../../../src/getup_jax/editor/pa
 import { contacts, reached, wordOf } from "../../../src/getup_jax/editor/page/contacts.js";
 import { around, pinched, Scale, snapped, timeTicks, within, zoomed } from "../../../src/getup_jax/editor/page/graph_scale.js";
 import { featuresAt } from "../../../src/getup_jax/editor/page/motion_recording.js";
-import { lostRuns } from "../../../src/getup_jax/editor/page/panel_motion.js";
+import { errorParts, errors, lostRuns } from "../../../src/getup_jax/editor/page/panel_motion.js";
 
 test("a scale turns places into times and values, and back", () => {
   const scale = new Scale(500, 200, [1, 4], [-0.2, 1.8]);
@@ -100,4 +100,18 @@ test("of a wished pose one sees which contacts were there for half of the time",
 
 test("where physics does not follow is said in runs of frames", () => {
   assert.deepEqual(lostRuns([0, 0.2, -0.3, 0.1, 0.16], 0.15), [[1, 2], [4, 4]]);
+});
+
+test("the error is a hill below the curve, and the curve is marked where physics does not follow", () => {
+  // a level curve of 1 m for 3 s at 1 frame/s; in the second frame the body is .3 m below it
+  const curve = Array(129).fill(1), motion = /** @type {any} */ ({ count: 3, features: [[1, 0.7, 1.05]] });
+  close(errors(motion, 0, curve, 3, 1), [0, -0.3, 0.05]);
+  const scale = new Scale(352, 142, [0, 3], [0, 2]), parts = errorParts(motion, 0, "height", { scale, height: 142, dt: 1 }, curve, 3);
+  assert.deepEqual(parts.map(({ attributes }) => attributes.class), ["error", "lost"]);
+  const [hill, lost] = parts.map(({ attributes }) => String(attributes.points).split(" ").map((pair) => pair.split(",").map(Number)));
+  const floor = 122, tops = hill.slice(1, -1).map(([, y]) => floor - y);
+  assert.ok(tops[0] === 0 && tops[1] > tops[2] && tops[2] > 0, `${tops}`);
+  assert.deepEqual(lost, [[scale.x(2), scale.y(1)]], "at the frame, on the curve");
+  motion.features = [[1, 0.99, 1.05]];
+  assert.deepEqual(errorParts(motion, 0, "height", { scale, height: 142, dt: 1 }, curve, 3).map(({ attributes }) => attributes.class), ["error"]);
 });
