@@ -17,7 +17,7 @@ export class Controls {
     this.store = store;
     /** @type {any} */
     this.scene = null;
-    this.listed = "";
+    this.listed = this.startsShown = "";
     this.judged = (/** @type {Curve} */ _) => ""; // what the policy makes of a curve
     const { curve, band, start, region, place, duration: slider, seconds, shift } = elements;
     curve.addEventListener("change", () => this.choose(curve.value));

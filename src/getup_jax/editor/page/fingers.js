@@ -12,7 +12,7 @@ export class Fingers {
     const { svg } = panel;
     svg.addEventListener("pointerdown", (event) => this.press(event), { capture: true });
     svg.addEventListener("pointermove", (event) => this.move(event));
-    for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, (event) => this.down.delete(event.pointerId));
+    for (const end of /** @type {const} */ (["pointerup", "pointercancel"])) svg.addEventListener(end, (event) => this.down.delete(event.pointerId));
   }
 
   /** @param {PointerEvent} event */

@@ -4,10 +4,12 @@ import {
   BufferAttribute, BufferGeometry, DoubleSide, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, PlaneGeometry,
 } from "./vendor/three.min.js";
 
+/** @import { Ground } from "./types.js" */
+
 const HALF_M = 20; // the lines of a plane reach this far
 const LIFT_M = 0.004; // of lines above the ground
 
-// Meshes of the ground {origin, step, points, heights}, null for a plane, in colours {floor, line}.
+/** Meshes of the ground. @param {Ground | null} ground null: a plane @param {{ floor: string, line: string }} colours @returns {any[]} */
 export function makeGround(ground, colours) {
   const material = new MeshLambertMaterial({ color: colours.floor, side: DoubleSide, flatShading: Boolean(ground) });
   Object.assign(material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 }); // the lines lie on it
@@ -27,17 +29,17 @@ function flat() {
   return ends;
 }
 
-// Along the edges of the triangles, so that the lines show what rises and falls.
+/** Along the edges of the triangles, so that the lines show what rises and falls. @param {Ground} ground */
 function raised({ origin, step, points, heights }) {
   const every = Math.max(1, Math.round(1 / step)), ends = [];
-  const corner = (row, column) => [origin[0] + column * step, origin[1] + row * step, heights[row * points + column] + LIFT_M];
+  const corner = (/** @type {number} */ row, /** @type {number} */ column) => [origin[0] + column * step, origin[1] + row * step, heights[row * points + column] + LIFT_M];
   for (let i = 0; i < points; i += every) {
     for (let j = 0; j + 1 < points; j++) ends.push(...corner(i, j), ...corner(i, j + 1), ...corner(j, i), ...corner(j + 1, i));
   }
   return ends;
 }
 
-// Height field triangles as MuJoCo cuts the cells: from the lower to the upper corner in x and y.
+/** Height field triangles as MuJoCo cuts the cells: from the lower to the upper corner in x and y. @param {Ground} ground */
 function landscape({ origin, step, points, heights }) {
   const position = new Float32Array(points * points * 3);
   const index = [];

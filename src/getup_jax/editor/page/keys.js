@@ -23,7 +23,9 @@ export function keysOf(points) {
 
 /** Slopes into and out of every key. @param {Key[]} keys */
 function slopes(keys) {
-  const n = keys.length, steps = [], rises = [];
+  const n = keys.length;
+  /** @type {number[]} */
+  const steps = [], /** @type {number[]} */ rises = [];
   for (let i = 0; i + 1 < n; i++) {
     steps.push(Math.max(keys[i + 1].time - keys[i].time, 1e-9));
     rises.push((keys[i + 1].value - keys[i].value) / steps[i]);
@@ -48,7 +50,8 @@ function slopes(keys) {
  * @param {number} before slope at the key before @param {number} after slope at the key after
  */
 function evenSlopes(first, last, steps, rises, before, after) {
-  const upper = [], right = [];
+  /** @type {number[]} */
+  const upper = [], /** @type {number[]} */ right = [];
   for (let i = first; i <= last; i++) {
     const a = i > 0 ? 1 / steps[i - 1] : 0, c = i < steps.length ? 1 / steps[i] : 0;
     let known = 3 * ((i > 0 ? a * rises[i - 1] : 0) + (c ? c * rises[i] : 0));

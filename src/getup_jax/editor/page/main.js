@@ -63,7 +63,7 @@ const tabs = new Tabs($("variants"), store);
 const ids = ["curve", "band", "start", "region", "place", "duration", "seconds", "shift", "name", "undo", "redo", "reset", "mirror"];
 const controls = new Controls(Object.fromEntries(ids.map((id) => [id, $(id)])), store, () => { due.curves = true; });
 const judging = new Judging(link, store);
-controls.judged = (curve) => judging.of(curve);
+controls.judged = (/** @type {import("./types.js").Curve} */ curve) => judging.of(curve);
 judging.addEventListener("change", () => controls.show());
 const stage = new Stage(store, results, player, sources);
 const projects = new Projects(storage, store, autosave, () => scene.curves[0]);

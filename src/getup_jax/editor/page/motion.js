@@ -3,6 +3,7 @@
 const DEGREES = 180 / Math.PI;
 
 export class Motion {
+  /** @param {number} number of the request @param {number} total frames @param {number} links @param {import("./types.js").Ground | null} ground null: flat */
   constructor(number, total, links, ground) {
     this.number = number;
     this.total = total;
@@ -12,9 +13,10 @@ export class Motion {
     this.poses = new Float32Array(total * links * 7);
     this.features = [new Float32Array(total), new Float32Array(total), new Float32Array(total)];
     this.result = null;
-    this.ground = ground; // null: flat
+    this.ground = ground;
   }
 
+  /** Frames that have come. @param {{ first: number, count: number, payload: ArrayBuffer }} message */
   add(message) {
     const values = new Float32Array(message.payload);
     const width = this.links * 7 + 4;
@@ -30,7 +32,7 @@ export class Motion {
     this.count = message.first + message.count;
   }
 
-  // Seven numbers a link: position and quaternion (wxyz).
+  /** Seven numbers a link: position and quaternion (wxyz). @param {number} frame */
   pose(frame) {
     const size = this.links * 7;
     return this.poses.subarray(frame * size, (frame + 1) * size);

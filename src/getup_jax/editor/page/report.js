@@ -48,7 +48,10 @@ export function wishWords(name, { reached, missed, others }) {
 
 export class Report {
   /** @param {Record<"verdict" | "scores" | "latency", HTMLElement>} elements */
-  constructor(elements) { this.elements = elements; }
+  constructor(elements) {
+    this.elements = elements;
+    this.shown = "";
+  }
 
   /** @param {Result | undefined} result @param {boolean} current @param {boolean} connected @param {number} matchDeg @param {() => string[]} wishes what came of them */
   show(result, current, connected, matchDeg, wishes) {

@@ -6,6 +6,8 @@ import { Body } from "./body.js";
 import { Fence } from "./gpu.js";
 import { heightAt } from "./height.js";
 
+/** @import { Motion } from "./motion.js" */
+
 const POSES = 7;
 const SPACING_M = 1.8;
 const BEFORE_M = 1.15, AFTER_M = 0.7; // room for a lying first pose and a standing last one
@@ -15,7 +17,7 @@ const PATIENCE_MS = 400; // the longest wait for an idle moment
 const whenIdle = window.requestIdleCallback?.bind(window) ?? ((call) => setTimeout(call, 20));
 
 export class Strip {
-  // canvas: shown, 2-D; the poses are drawn on one of their own behind it
+  /** @param {HTMLCanvasElement} canvas shown, 2-D; the poses are drawn on one of their own behind it @param {any} scene @param {boolean} software the processor draws */
   constructor(canvas, scene, software) {
     this.canvas = canvas;
     this.renderer = new WebGLRenderer({ canvas: document.createElement("canvas"), antialias: !software, preserveDrawingBuffer: true });
@@ -43,7 +45,7 @@ export class Strip {
     this.sky = new Color(getComputedStyle(document.documentElement).getPropertyValue("--sky").trim());
   }
 
-  // azimuth: where the view's camera stands. may(): false while others need the renderer.
+  /** @param {Motion | null} motion @param {number} azimuth where the view's camera stands @param {() => boolean} may false while others need the renderer */
   draw(motion, azimuth, may) {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (!motion?.count || !width) return;
@@ -81,6 +83,7 @@ export class Strip {
     this.canvas.getContext("2d")?.clearRect(0, 0, this.canvas.width, this.canvas.height);
   }
 
+  /** @param {number} width @param {number} height px */
   begin(width, height) {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
@@ -92,6 +95,7 @@ export class Strip {
     this.renderer.clear();
   }
 
+  /** @param {Motion} motion @param {number} azimuth @param {number} i number of the pose */
   add(motion, azimuth, i) {
     const frame = Math.min(Math.round((i * (motion.total - 1)) / (POSES - 1)), motion.count - 1);
     const values = motion.pose(frame);
@@ -107,7 +111,7 @@ export class Strip {
     const drawn = this.renderer.domElement;
     this.canvas.width = drawn.width;
     this.canvas.height = drawn.height;
-    this.canvas.getContext("2d").drawImage(drawn, 0, 0);
+    this.canvas.getContext("2d")?.drawImage(drawn, 0, 0);
     this.canvas.classList.remove("stale");
   }
 

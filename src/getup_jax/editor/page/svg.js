@@ -4,13 +4,14 @@
 
 const NS = "http://www.w3.org/2000/svg";
 
+/** @param {string} name @param {Record<string, string | number>} attributes @returns {SVGElement} */
 export function make(name, attributes = {}) {
   const element = document.createElementNS(NS, name);
   set(element, attributes);
   return element;
 }
 
-// What stays as it is, is not written: the browser would lay the whole drawing out anew.
+/** What stays as it is, is not written: the browser would lay the whole drawing out anew. @param {Element} element @param {Record<string, unknown>} attributes */
 export function set(element, attributes) {
   for (const [key, value] of Object.entries(attributes)) {
     const text = String(value);
@@ -35,12 +36,14 @@ export function fill(root, parts) {
   while (root.children.length > parts.length) root.lastElementChild?.remove();
 }
 
+/** @param {string} words */
 function titled(words) {
   const title = make("title");
   title.textContent = words;
   return title;
 }
 
+/** @param {number} x @param {number} y @param {string} content @param {Record<string, string | number>} attributes */
 export function text(x, y, content, attributes = {}) {
   const element = make("text", { x, y, ...attributes });
   element.textContent = content;

@@ -4,6 +4,7 @@ import { recalled, remember } from "./recall.js";
 
 const KEY = "getup-theme";
 
+/** @param {HTMLElement} button @param {() => void} onChange */
 export function watchTheme(button, onChange) {
   const dark = matchMedia("(prefers-color-scheme: dark)");
   let chosen = recalled("localStorage", KEY);

@@ -36,6 +36,9 @@
 /** @typedef {{ now: Content, past: Content[], future: Content[], tag: string, at: number }} History */
 /** @typedef {{ slot: number, history: History }} Variant slot: 0 to 3, its letter and its colour for life */
 
+/** @typedef {{ origin: number[], step: number, points: number, heights: number[] }} Ground a piece of a height field: heights (m) row by row on a grid (m) */
+/** @typedef {{ link: number, kind: string, size: number[], position: number[], quaternion: number[], colour: number[] }} Shape of the body, as the server describes it */
+
 /** @typedef {{ fps: number, total: number, links: number, frames: Float32Array }} Recording link poses and features of a clip */
 /** @typedef {{ curve: Curve, file: string, recording: Recording | null }} Imported */
 

@@ -43,6 +43,7 @@ export class View {
     this.follow = true;
     this.home = this.orbit.azimuth;
     this.apart = false;
+    this.arranged = "";
     /** @type {Map<number, Body>} by slot */
     this.bodies = new Map();
     this.source = new Body(scene.shapes, scene.links.length);
@@ -69,12 +70,13 @@ export class View {
   // Colours of the page's theme.
   theme() {
     const style = getComputedStyle(document.documentElement);
-    const colour = (name) => style.getPropertyValue(name).trim();
+    const colour = (/** @type {string} */ name) => style.getPropertyValue(name).trim();
     this.scene.background = new Color(colour("--sky"));
     this.colours = { sky: colour("--sky"), floor: colour("--floor"), line: colour("--floor-line") };
     this.setGround(this.ground ?? null);
   }
 
+  /** @param {import("./types.js").Ground | null} ground null: a plane */
   setGround(ground) {
     this.ground = ground;
     if (this.floor) {
@@ -141,7 +143,7 @@ export class View {
     this.dirty = true;
   }
 
-  // Looks at a lying body from its side.
+  /** Looks at a lying body from its side. @param {Float32Array} values seven numbers a link @param {number} neck its number */
   face(values, neck) {
     const dx = values[7 * neck] - values[0], dy = values[7 * neck + 1] - values[1];
     if (Math.hypot(dx, dy) > 0.1) this.orbit.azimuth = Math.atan2(dy, dx) - 0.42 * Math.PI;
@@ -158,6 +160,7 @@ export class View {
     this.dirty = true;
   }
 
+  /** Towards a body. @param {Float32Array} values @param {number} share of the way */
   centre(values, share) {
     const level = this.ground ? heightAt(this.ground, values[0], values[1]) : 0;
     const aim = new Vector3(values[0], values[1], level + LOOK_AT_M);
@@ -206,7 +209,7 @@ export class View {
     }));
   }
 
-  // Without shadows and sharp edges where they cost too much.
+  /** Without shadows and sharp edges where they cost too much. @param {number} took ms, of the last picture */
   pace(took) {
     // the first ones compile shaders, and a single one may be slow for another reason
     this.mean += 0.1 * (Math.min(took, 2 * SLOW_MS) - this.mean);
@@ -225,6 +228,7 @@ export class View {
     this.camera.updateProjectionMatrix();
   }
 
+  /** @param {number} azimuth @param {number} elevation rad @param {number} zoom times as far */
   turn(azimuth, elevation, zoom = 1) {
     this.orbit.azimuth += azimuth;
     this.orbit.elevation = Math.min(Math.max(this.orbit.elevation + elevation, -0.05), 1.5);
@@ -254,6 +258,7 @@ export class View {
       this.turn(0, 0, Math.exp(0.0012 * event.deltaY));
     }, { passive: false });
     canvas.addEventListener("keydown", (event) => {
+      /** @type {Record<string, [number, number, number?]>} */
       const turns = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.08], ArrowDown: [0, -0.08], "+": [0, 0, 0.9], "-": [0, 0, 1.1] };
       if (!(event.key in turns) || event.ctrlKey || event.metaKey) return;
       event.preventDefault();
