@@ -176,6 +176,11 @@ def test_help_lists_every_key_and_the_hint_stays_away_once_it_was_read(page_serv
         page.reload()
         page.wait_for_selector("body[data-shown]", timeout=60_000)
         assert page.is_hidden("#hint")
+        page.locator("#band").focus()
+        page.keyboard.press("h")  # goes to what begins with it in the list, and is no shortcut
+        drawn(page)
+        assert page.is_disabled("#undo")
+        page.locator("#view").focus()
         before = page.inner_text("#play")
         page.keyboard.press("?")
         listed = page.locator("#help-list dt").all_inner_texts()

@@ -251,9 +251,11 @@ def test_points_snap_and_what_the_policy_cannot_follow_is_shown(page_server):
         drawn(page)
         assert lines.count() == 0
         edited(page, lambda: page.select_option("#start", value="supine_situp_squat"))
-        judged(page)
+        mood = "near" if "by its own way" in judged(page) else "bad"
+        assert mood in page.get_attribute("#verdict", "class").split()
         drawn(page)
         assert page.locator(".lost").count() > 0
+        shot(page, mood)
 
 
 @contextlib.contextmanager

@@ -14,6 +14,7 @@ from browser import (
     opened,
     says,
     served,
+    shot,
     shown,
     value,
 )
@@ -119,6 +120,8 @@ def test_what_was_removed_outlives_its_notice_and_the_page(page_server):
         found = value(page, HEIGHT, 4)
         page.click('[aria-label="Remove this variant"]')
         again()
+        shot(page, "removed")
+        assert page.locator("#dot").bounding_box()["x"] < 1280, "the list has no room"
         page.select_option("#removed", index=1)
         page.wait_for_function("() => document.querySelectorAll('[role=tab]').length === 2")
         assert value(page, HEIGHT, 4) == found

@@ -78,6 +78,7 @@ def test_frames_come_first_and_then_the_result(session):
     assert sum(f["count"] for f in frames) == frames[0]["total"]
     assert (result["type"], result["number"]) == ("result", 7)
     assert result["success"] is False
+    assert result["stands"] is False
     assert result["verdict"].startswith("fails at")
     assert session.motion(ask(8)).scores["energy_j"] == result["scores"]["energy_j"]
 

@@ -27,7 +27,7 @@ export class Tabs {
       buttons.push(el("button", { title: words, "aria-label": words, onclick: () => this.remove() }, "×"));
     }
     if (removed.length) {
-      const words = "Put back a variant that was removed", back = (/** @type {any} */ { target }) => this.putBack(removed[Number(target.value)]);
+      const words = "Put back a variant that was removed", back = (/** @type {any} */ { target }) => this.putBack(store.project?.removed[Number(target.value)]);
       buttons.push(el("select", { id: "removed", title: words, "aria-label": words, onchange: back }, option("", "Removed…"), ...names.map((name, i) => option(String(i), name)).reverse()));
     }
     const focused = [...root.children].indexOf(/** @type {Element} */ (document.activeElement));
@@ -40,9 +40,10 @@ export class Tabs {
     if (removed) say(`Variant ${LETTERS[removed.slot]} is removed.`, false, { words: "Put it back", act: () => this.putBack(removed) });
   }
 
-  /** @param {import("./types.js").Variant} variant */
+  /** @param {import("./types.js").Variant | undefined} variant */
   putBack(variant) {
-    if (!this.store.putBack(variant)) say("Four variants are the most: remove one first.");
+    if (this.store.variants.length >= SLOTS) say("Four variants are the most: remove one first.");
+    else if (!variant || !this.store.putBack(variant)) say("It is not among those that were removed from this project.");
     this.shown = ""; // the list says nothing again
     this.draw();
   }
