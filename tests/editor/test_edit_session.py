@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from edit_samples import make_curve, whole_motion
 
+from getup_jax.editor import session as sessions
 from getup_jax.editor.messages import Request
 from getup_jax.editor.session import Session
 from getup_jax.editor.verdict import verdict
@@ -81,6 +82,24 @@ def test_frames_come_first_and_then_the_result(session):
     assert result["stands"] is False
     assert result["verdict"].startswith("fails at")
     assert session.motion(ask(8)).scores["energy_j"] == result["scores"]["energy_j"]
+
+
+def test_on_one_core_the_page_draws_before_the_rest_is_made(session, monkeypatch):
+    monkeypatch.setattr(sessions, "one_core", lambda: True)
+    monkeypatch.setattr(sessions, "_PAGE_DRAWS_S", 30.0)
+    first, second = Box(), Box()
+    session.simulator.gate.set()
+    session.submit(0, ask(1), first)
+    deadline = time.monotonic() + 60
+    while not first.got and time.monotonic() < deadline:
+        time.sleep(0.01)
+    time.sleep(0.2)
+    assert [f["first"] for f in first.got] == [0], "the rest waits"
+    session.submit(0, ask(2), second)  # a newer edit does not
+    while not second.got and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert [f["first"] for f in second.got] == [0]
+    assert len(first.got) == 1
 
 
 def test_a_new_edit_cancels_the_old_one(session):

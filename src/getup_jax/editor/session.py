@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import json
+import os
 import threading
 import time
 import warnings
@@ -17,6 +18,7 @@ from getup_jax.editor.scene import ground
 from getup_jax.editor.simulate import Frames, Motion, Simulator
 
 _KEPT = 16  # motions kept for exports
+_PAGE_DRAWS_S = 0.05  # what a page takes to show the first frames
 Send = Callable[[str | bytes], None]  # may be called from any thread
 
 
@@ -131,10 +133,17 @@ class Session:
                 if part.first == 0:
                     self._send_ground(job, part)
                 job.send(messages.frames_message(job.request, part, total))
+                if part.first == 0 and one_core():
+                    self._let_the_page_draw(job)
             else:
                 self._keep(_key(job.request), part)
                 seconds = time.perf_counter() - begin
                 job.send(messages.result_message(job.request, part, seconds))
+
+    def _let_the_page_draw(self, job: Job) -> None:
+        """A pause in which a page on the same core shows the first frames; a newer job ends it."""
+        with self._wake:
+            self._wake.wait_for(lambda: self._current is not job, timeout=_PAGE_DRAWS_S)
 
     def _send_ground(self, job: Job, frames: Frames) -> None:
         """The ground around the start comes before the first frames; a plane needs no words."""
@@ -149,6 +158,13 @@ class Session:
             self._motions.move_to_end(key)
             while len(self._motions) > _KEPT:
                 self._motions.popitem(last=False)
+
+
+def one_core() -> bool:
+    """Whether this process has a single core, which it shares with a browser on the machine."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0)) == 1
+    return os.cpu_count() == 1
 
 
 class Asked(Protocol):
