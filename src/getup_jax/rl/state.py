@@ -23,11 +23,23 @@ class PolicyState:
 
 
 @struct.dataclass
+class Judgement:
+    """What a discriminator has learned, without its optimiser."""
+
+    variables: Any
+    statistics: Moments  # [D] of the frames
+
+
+@struct.dataclass
 class Valuation:
-    """What values need; with a policy that goes on training, its critic need not begin anew."""
+    """What rewards and values need: with it, a policy that goes on training is valued as before.
+
+    Discriminators that begin anew see through every motion, or through none, for a while.
+    """
 
     critic: Any  # variables of the critic network
     popart: PopArt | None  # [K]; None: targets in return units
+    discriminators: dict[str, Judgement] | None = None  # by motion group
 
 
 @struct.dataclass
@@ -51,17 +63,30 @@ class LearnerState:
 
     @property
     def valuation(self) -> Valuation:
-        """What an exported policy keeps of the critic."""
-        return Valuation(self.critic, self.popart)
+        """What an exported policy keeps of critic and discriminators."""
+        states = self.discriminators
+        judgements = states and {
+            name: Judgement(state.variables, state.statistics) for name, state in states.items()
+        }
+        return Valuation(self.critic, self.popart, judgements)
 
     def beginning_with(self, policy: PolicyState, valuation: Valuation) -> LearnerState:
-        """The learner with another policy, which so far is its own average, and its critic."""
+        """The learner with another policy, which so far is its own average, and what values it."""
+        states, learned = self.discriminators, valuation.discriminators
+        if states and learned:
+            states = {
+                name: dataclasses.replace(
+                    state, variables=learned[name].variables, statistics=learned[name].statistics
+                )
+                for name, state in states.items()
+            }
         return dataclasses.replace(
             self,
             policy=policy,
             average=policy.actor,
             critic=valuation.critic,
             popart=valuation.popart,
+            discriminators=states,
         )
 
 

@@ -138,7 +138,8 @@ class Loop:
         except CheckpointError as error:
             self._display.log(f"a new critic, since that of the policy does not fit: {error}")
             return own
-        self._display.log("with its critic")
+        judged = " and discriminators" if loaded.critic.get("discriminators") else ""
+        self._display.log(f"with its critic{judged}")
         return found
 
     def _load_learner(self, path: str) -> None:
