@@ -67,6 +67,9 @@ class PPOConfig:
     target_clip_fraction: float | None = number(None, above=0, below=1)
     # iterations that leave the actor alone, after `train.init_from`
     critic_first: int = number(0, least=0, most=1_000_000)
+    # samples that the moving average of the actor's weights spans, which is what is evaluated and
+    # exported, and at most a tenth of the run so far; 0: the newest weights
+    average_steps: float = number(1e6, least=0, most=1e12)
     normalize_observation: bool = True  # by running mean and variance
     popart: bool = False  # normalise the value targets of every objective
 

@@ -216,7 +216,9 @@ class Learner:
         """With the newest actor in the average of its weights."""
         updates = jnp.maximum(iteration - self.config.critic_first, 0)
         samples = self.config.num_envs * self.config.num_steps
-        actor = weight_average.update(learner.average, learner.policy.actor, updates, samples)
+        actor = weight_average.update(
+            learner.average, learner.policy.actor, updates, samples, self.config.average_steps
+        )
         return dataclasses.replace(learner, average=actor)
 
     @property

@@ -12,14 +12,13 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-WINDOW_STEPS = 1e6  # samples of the window
-WINDOW_SHARE = 0.1  # ... and at most this share of the updates so far
+WINDOW_SHARE = 0.1  # of the updates so far, at most
 
 
-def update(average: Any, actor: Any, updates: jax.Array, samples: int) -> Any:
+def update(average: Any, actor: Any, updates: jax.Array, samples: int, window: float) -> Any:
     """The average after another iteration.
 
-        fraction = max(samples / WINDOW_STEPS, 1 / (1 + WINDOW_SHARE * updates)), at most 1
+        fraction = max(samples / window, 1 / (1 + WINDOW_SHARE * updates)), at most 1
         average  = average + fraction * (actor - average)
 
     Args:
@@ -28,7 +27,10 @@ def update(average: Any, actor: Any, updates: jax.Array, samples: int) -> Any:
         updates: [] iterations that changed the actor before this one; after none, the average is
             the actor itself.
         samples: of an iteration.
+        window: samples, `ppo.average_steps`; 0: no average, but the actor itself.
     """
+    if window == 0:
+        return actor
     young = 1.0 / (1.0 + WINDOW_SHARE * updates.astype(jnp.float32))
-    fraction = jnp.clip(jnp.maximum(samples / WINDOW_STEPS, young), 0.0, 1.0)
+    fraction = jnp.clip(jnp.maximum(samples / window, young), 0.0, 1.0)
     return jax.tree.map(lambda old, new: old + fraction * (new - old), average, actor)
