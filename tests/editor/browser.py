@@ -50,10 +50,12 @@ def served(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
 
 
 @contextlib.contextmanager
-def opened(address: str, profile: Path | None = None, **context: Any) -> Iterator[Any]:
+def opened(
+    address: str, profile: Path | None = None, script: str = "", **context: Any
+) -> Iterator[Any]:
     """The page at the address, with its first motion; what goes wrong in it fails the test.
 
-    A profile keeps what a browser keeps when it is closed.
+    A profile keeps what a browser keeps when it is closed; a script changes the browser before.
     """
     reason = "needs pip install 'getup-jax[browser]'"
     sync_playwright = pytest.importorskip("playwright.sync_api", reason=reason).sync_playwright
@@ -68,25 +70,12 @@ def opened(address: str, profile: Path | None = None, **context: Any) -> Iterato
             holder = kind.launch_persistent_context(profile, **started, **options)
             page = holder.pages[0]
         page.on("pageerror", lambda error: problems.append(str(error)))
+        page.add_init_script(script)
         page.goto(address)
         page.wait_for_selector("body[data-shown]", timeout=120_000)
         yield page
         holder.close()
     assert not problems, problems
-
-
-@contextlib.contextmanager
-def opened_after(address: str, script: str) -> Iterator[Any]:
-    """The page in a browser that a script has changed before."""
-    with opened(address) as first:
-        context = first.context.browser.new_context()
-        context.add_init_script(script)
-        page, problems = context.new_page(), []
-        page.on("pageerror", lambda error: problems.append(str(error)))
-        page.goto(address)
-        page.wait_for_selector("body[data-shown]", timeout=120_000)
-        yield page
-        assert not problems
 
 
 def drag(page: Any, panel: str, point: int, pixels: int) -> None:
@@ -166,14 +155,22 @@ def achieved(page: Any) -> str:
     return page.locator(f'[aria-label="{HEIGHT}"] .achieved').first.get_attribute("points")
 
 
-def saved(page: Any, click: str, folder: Path) -> Path:
-    """The file that #save, or the dialog of exports with a format, gives."""
+def new_project(page: Any) -> None:
+    """By the dialog of projects."""
+    page.click("#project")
+    page.click("#project-new")
+
+
+def saved(page: Any, click: str, folder: Path, **choices: str) -> Path:
+    """The file that #save, or the dialog of exports with a format and choices, gives."""
     with page.expect_download(timeout=60_000) as download:
         if click.startswith("#"):
             page.click(click)
         else:
             page.click("#export")
             page.select_option("#format", click)
+            for choice, value in choices.items():
+                page.select_option(f"#{choice}", value)
             page.click("#export-go")
     path = folder / download.value.suggested_filename
     download.value.save_as(path)

@@ -13,8 +13,8 @@ from browser import (
     HEIGHT,
     drag,
     edited,
+    new_project,
     opened,
-    opened_after,
     picture,
     saved,
     says,
@@ -62,11 +62,6 @@ def test_what_is_saved_opens_again_and_evaluates_the_same(page_server, tmp_path)
     assert f"jitter {found['jitter']:.0f} rad/s³" in scores
 
 
-def new_project(page) -> None:
-    page.click("#project")
-    page.click("#project-new")
-
-
 def curve_at(curve, share: float) -> float:
     """Height (m) of the curve at a share of its duration."""
     return float(curves.evaluate(jnp.asarray(curve.values), jnp.asarray([share]))[0, 0])
@@ -79,14 +74,7 @@ def test_exports_hold_the_motion_that_is_shown(page_server, tmp_path):
         kinds = ("bvh", "npz", "csv", *(("glb",) if glb else ()), "png")
         files = {kind: saved(page, kind, tmp_path) for kind in kinds}
         seconds = float(page.input_value("#seconds"))
-        page.click("#export")
-        page.select_option("#format", "bvh")
-        page.select_option("#part", "rise")
-        page.select_option("#rate", "60")
-        with page.expect_download(timeout=60_000) as download:
-            page.click("#export-go")
-        rise = tmp_path / "rise.bvh"
-        download.value.save_as(rise)
+        rise = saved(page, "bvh", tmp_path / "rise", part="rise", rate="60")
         page.wait_for_timeout(300)
         assert np.ptp(picture(page, "#view")) > 0.3, "the view is empty after the picture"
     still = imread(files["png"])
@@ -186,13 +174,7 @@ def test_a_film_is_large_says_how_far_it_is_and_can_be_cancelled(page_server, tm
         assert not page.locator("#dialog").evaluate("dialog => dialog.open")
         page.locator("#scrub").fill("0.04")
         page.click("#out")
-        page.click("#export")
-        page.select_option("#format", "mp4")
-        page.select_option("#part", "range")
-        with page.expect_download(timeout=60_000) as download:
-            page.click("#export-go")
-        file = tmp_path / "film.mp4"
-        download.value.save_as(file)
+        file = saved(page, "mp4", tmp_path, part="range")
     with imageio.get_reader(file) as film:
         assert film.get_meta_data()["fps"] == 30
         assert film.get_data(0).shape == (1080, 1920, 3)
@@ -208,7 +190,7 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
 
 
 def test_without_webgl_a_picture_is_refused_with_a_reason_and_all_else_works(page_server, tmp_path):
-    with opened_after(page_server[0], _NO_WEBGL) as page:
+    with opened(page_server[0], script=_NO_WEBGL) as page:
         says(page, "veil", "no WebGL")
         page.click("text=+ variant")
         edited(page, lambda: drag(page, HEIGHT, 4, 20))

@@ -11,7 +11,9 @@ from browser import (
     achieved,
     drag,
     edited,
+    new_project,
     opened,
+    saved,
     says,
     served,
     shot,
@@ -60,10 +62,7 @@ def test_projects_are_made_exported_imported_and_removed(page_server, tmp_path):
         edited(page, lambda: drag(page, HEIGHT, 4, 40))
         found = value(page, HEIGHT, 4)
         page.click("#project")
-        with page.expect_download() as download:
-            page.click("#project-export")
-        file = tmp_path / download.value.suggested_filename
-        download.value.save_as(file)
+        file = saved(page, "#project-export", tmp_path)
         assert file.name == "My get-up.getup.json"
         edited(page, lambda: page.click("#project-new"))
         assert value(page, HEIGHT, 4) != found
@@ -129,8 +128,7 @@ def test_what_was_removed_outlives_its_notice_and_the_page(page_server):
         page.click('[aria-label="Remove this variant"]')
         page.keyboard.press("Control+z")
         assert value(page, HEIGHT, 4) == found
-        page.click("#project")
-        page.click("#project-new")
+        new_project(page)
         says(page, "project", "My get-up 2")
         page.click("#project")
         page.click('#project-list button[title="Remove"]:not([disabled])')

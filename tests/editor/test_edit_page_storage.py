@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from browser import BROWSER, HEIGHT, drag, edited, judged, opened_after, says, value
+from browser import BROWSER, HEIGHT, drag, edited, judged, new_project, opened, says, value
 
 pytestmark = BROWSER
 
@@ -33,7 +33,7 @@ window.empty = () => { IDBObjectStore.prototype.put = window.put; };
     ("script", "words"), [(_FORBIDDEN, "keeps nothing"), (_UNREADABLE, "(broken); export it")]
 )
 def test_a_browser_that_keeps_nothing_edits_all_the_same(page_server, script, words):
-    with opened_after(page_server[0], script) as page:
+    with opened(page_server[0], script=script) as page:
         says(page, "toast", words)
         edited(page, lambda: drag(page, HEIGHT, 4, 30))
         assert judged(page)
@@ -46,7 +46,7 @@ def test_a_browser_that_keeps_nothing_edits_all_the_same(page_server, script, wo
 
 
 def test_a_browser_is_asked_once_to_forget_no_project(page_server):
-    with opened_after(page_server[0], _COUNTED) as page:
+    with opened(page_server[0], script=_COUNTED) as page:
         assert page.evaluate("kept") == 0
         for pixels in (30, -30):
             edited(page, lambda up=pixels: drag(page, HEIGHT, 4, up))
@@ -56,13 +56,12 @@ def test_a_browser_is_asked_once_to_forget_no_project(page_server):
 
 
 def test_a_project_that_is_not_stored_is_not_left_without_a_word(page_server):
-    with opened_after(page_server[0], _FULL) as page:
+    with opened(page_server[0], script=_FULL) as page:
         page.evaluate("fill()")
         edited(page, lambda: drag(page, HEIGHT, 4, 30))
         mine = value(page, HEIGHT, 4)
         says(page, "toast", "did not store the project (full)")
-        page.click("#project")
-        page.click("#project-new")
+        new_project(page)
         says(page, "toast", "is not stored: export it first")
         assert page.inner_text("#project") == "My get-up"
         assert value(page, HEIGHT, 4) == mine

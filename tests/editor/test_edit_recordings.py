@@ -14,12 +14,12 @@ from getup_jax.config import PhysicsConfig
 from getup_jax.editor.answers import answer
 from getup_jax.editor.messages import MessageError, Request
 from getup_jax.editor.recordings import packed
-from getup_jax.editor.scene import mirror_links
 from getup_jax.editor.simulate import link_poses
 from getup_jax.editor.site import PAGE
 from getup_jax.motion.clips import Clip
 from getup_jax.motion.retarget.subprocess_job import Stop
 from getup_jax.physics.character import load_character
+from getup_jax.physics.mirror_image import link_images
 
 CHARACTER = load_character(PhysicsConfig())
 
@@ -89,7 +89,7 @@ def test_the_mirror_image_that_the_page_makes_is_that_of_the_character():
     heads, payload = packed([clip, image], CHARACTER)
     found, wanted = np.split(rows(payload), 2)
     head = json.dumps({**heads[0], "frames": found.ravel().tolist()})
-    links = json.dumps(mirror_links(CHARACTER.link_names))
+    links = json.dumps(link_images(CHARACTER).tolist())
     script = MIRROR % (PAGE / "motion_recording.js").as_uri()
     command = [NODE, "--input-type=module", "-e", script, head, links]
     done = subprocess.run(command, capture_output=True, text=True, check=True)

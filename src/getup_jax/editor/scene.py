@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -19,6 +17,7 @@ from getup_jax.motion.io import curve_file
 from getup_jax.motion.io.curve_file import CurveFile, read_curve_file
 from getup_jax.motion.library import AUTHORED
 from getup_jax.physics.character import CharacterSpec
+from getup_jax.physics.mirror_image import link_images
 from getup_jax.physics.terrain import HeightField
 from getup_jax.physics.terrain_map import REGIONS
 from getup_jax.runtime.checkpoint import LoadedPolicy
@@ -55,7 +54,7 @@ def describe(simulator: Simulator, loaded: LoadedPolicy) -> dict[str, Any]:
         "mirror": {
             "joint": simulator.character.mirror_joint.tolist(),
             "sign": simulator.character.mirror_sign.tolist(),
-            "link": mirror_links(simulator.character.link_names),
+            "link": link_images(simulator.character).tolist(),
         },
         "mirrored": None if starts.places else curve_file.MIRRORED,
         "curves": [curve.plain() for curve in library_curves(simulator)],
@@ -70,15 +69,6 @@ def describe(simulator: Simulator, loaded: LoadedPolicy) -> dict[str, Any]:
         "terrain": {"regions": REGIONS, "places": starts.places} if starts.places else None,
         "formats": missing_extras(),
     }
-
-
-def mirror_links(names: Sequence[str]) -> list[int]:
-    """The number of every link's image on the other side; one without an image has its own."""
-    swapped = [re.sub(r"_([lr])(?=_|$)", lambda m: "_" + "rl"["lr".index(m[1])], n) for n in names]
-    return [
-        names.index(image if image in names else own)
-        for image, own in zip(swapped, names, strict=True)
-    ]
 
 
 def library_curves(simulator: Simulator) -> list[CurveFile]:
