@@ -85,7 +85,7 @@ def test_frames_come_first_and_then_the_result(session):
 
 
 def test_on_one_core_the_page_draws_before_the_rest_is_made(session, monkeypatch):
-    monkeypatch.setattr(sessions, "one_core", lambda: True)
+    monkeypatch.setattr(sessions, "cpus", lambda: 1)
     monkeypatch.setattr(sessions, "_PAGE_DRAWS_S", 30.0)
     first, second = Box(), Box()
     session.simulator.gate.set()

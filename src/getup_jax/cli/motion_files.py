@@ -13,9 +13,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from getup_jax.cli.motion_report import FileReport, report_of
 from getup_jax.config import MotionConfig
+from getup_jax.core.cpus import cpus
 from getup_jax.motion.clips import MotionError
 from getup_jax.motion.io.readers import ReadOptions, is_clip, motion_files
-from getup_jax.motion.library import MotionLibrary, cpus, load_motions, to_retarget
+from getup_jax.motion.library import MotionLibrary, load_motions, to_retarget
 from getup_jax.motion.retarget.cache import Done, Job, Result, read_npz, retarget_files
 from getup_jax.motion.retarget.joint_names import read_map
 from getup_jax.motion.retarget.retarget import RetargetSettings

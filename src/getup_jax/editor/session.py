@@ -5,13 +5,13 @@ from __future__ import annotations
 import collections
 import dataclasses
 import json
-import os
 import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
+from getup_jax.core.cpus import cpus
 from getup_jax.editor import messages
 from getup_jax.editor.messages import Request
 from getup_jax.editor.scene import ground
@@ -133,7 +133,7 @@ class Session:
                 if part.first == 0:
                     self._send_ground(job, part)
                 job.send(messages.frames_message(job.request, part, total))
-                if part.first == 0 and one_core():
+                if part.first == 0 and cpus() == 1:  # which a browser shares
                     self._let_the_page_draw(job)
             else:
                 self._keep(_key(job.request), part)
@@ -158,13 +158,6 @@ class Session:
             self._motions.move_to_end(key)
             while len(self._motions) > _KEPT:
                 self._motions.popitem(last=False)
-
-
-def one_core() -> bool:
-    """Whether this process has a single core, which it shares with a browser on the machine."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0)) == 1
-    return os.cpu_count() == 1
 
 
 class Asked(Protocol):

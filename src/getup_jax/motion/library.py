@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.util
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from getup_jax.config import MotionConfig
+from getup_jax.core.cpus import cpus
 from getup_jax.motion.authoring.library import carried_files
 from getup_jax.motion.clips import Clip, GetUp, MotionError
 from getup_jax.motion.getup.getups import cut_getup, find_getups
@@ -140,13 +140,6 @@ def _clips(
         clips.append(result[0])
         report[str(file)] = result[1]
     return clips, report
-
-
-def cpus() -> int:
-    """How many files to retarget at once."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _authored(

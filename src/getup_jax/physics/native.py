@@ -10,7 +10,6 @@ The host function never touches jax: a jitted call inside a callback hangs for l
 from __future__ import annotations
 
 import copy
-import os
 import threading
 from typing import Any, cast
 
@@ -22,6 +21,7 @@ from jax.experimental.buffer_callback import buffer_callback
 from mujoco.batch import Batch, SimulationError
 
 from getup_jax.config import PhysicsConfig
+from getup_jax.core.cpus import cpus
 from getup_jax.core.types import Kinematics, PhysicsState, PropCommand, check_control
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.props import with_balls
@@ -69,7 +69,7 @@ class NativeEngine:
         self._sizes = _Sizes(character)
         self.control_dt = 1.0 / config.control_hz
         self._substeps = config.substeps
-        self._threads = config.threads or len(os.sched_getaffinity(0))
+        self._threads = config.threads or cpus()
         self._batches: dict[int, _HostBatch] = {}
         self._lock = threading.Lock()
 
