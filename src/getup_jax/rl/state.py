@@ -64,10 +64,12 @@ class LearnerState:
     @property
     def valuation(self) -> Valuation:
         """What an exported policy keeps of critic and discriminators."""
-        states = self.discriminators
-        judgements = states and {
-            name: Judgement(state.variables, state.statistics) for name, state in states.items()
-        }
+        judgements = None
+        if self.discriminators is not None:
+            judgements = {
+                name: Judgement(state.variables, state.statistics)
+                for name, state in self.discriminators.items()
+            }
         return Valuation(self.critic, self.popart, judgements)
 
     def beginning_with(self, policy: PolicyState, valuation: Valuation) -> LearnerState:
