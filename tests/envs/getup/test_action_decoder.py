@@ -8,7 +8,6 @@ import pytest
 from tiny_task import CONFIG, LATENT, untrained_prior
 
 from getup_jax.envs.getup.action_decoder import ActionDecoder
-from getup_jax.envs.getup.rewards import natural
 
 SCALE = 0.25
 LIMIT = CONFIG.task.offset_limit_rad
@@ -37,36 +36,23 @@ def sums(action) -> np.ndarray:
     return SCALE * np.abs(np.asarray(action)[:, LATENT:]).sum(axis=1)
 
 
-def test_a_pose_within_the_budget_is_held_exactly(units, angles, condition):
-    far = sums(units.action(angles, angles, condition)).max()
-    held = units.hold(angles, condition, far + 1.0)
-    np.testing.assert_allclose(units.target(held, condition), angles, atol=1e-5)
-
-
-def test_beyond_it_the_target_lies_between_the_priors_pose_and_the_start(units, angles, condition):
-    exact = units.action(angles, angles, condition)
-    most = 0.5 * sums(exact).min()
-    held = units.hold(angles, condition, most)
-    np.testing.assert_allclose(sums(held), most, rtol=1e-5)
-    near, share = units.pose(exact, condition), most / sums(exact)[:, None]
-    expected = near + share * (angles - near)
-    np.testing.assert_allclose(units.target(held, condition), expected, atol=1e-5)
-
-
-def test_after_a_limp_start_the_natural_reward_is_on_from_the_first_step(units, angles, condition):
+def test_a_limp_body_is_held_exactly_however_far_from_the_prior(units, angles, condition):
     task = dataclasses.replace(CONFIG.task, limp_share=0.5)
-    kept = 1.0 - task.filter  # what the filter leaves of it in one step without an action
-
-    def reward(action) -> np.ndarray:
-        return np.asarray(natural(SCALE * kept * action[:, LATENT:], LIMIT))
-
-    limp = angles[1:], condition[1:]
-    exact = units.first(dataclasses.replace(task, limp_share=0.0), False, *limp)
-    assert sums(exact) > LIMIT / kept
-    np.testing.assert_array_equal(reward(exact), 0.0)
+    assert sums(units.action(angles, angles, condition)).max() > LIMIT
     for flat in (True, False):
-        first = units.first(task, flat, *limp)
-        np.testing.assert_allclose(reward(first), 1.0 - kept**2, rtol=1e-5)
+        first = units.first(task, flat, angles, condition)
+        np.testing.assert_allclose(units.target(first, condition), angles, atol=1e-5)
+
+
+def test_the_offsets_that_hold_a_start_pose_are_nobodys(units, angles, condition):
+    task = dataclasses.replace(CONFIG.task, limp_share=0.5)
+    first, unasked = units.begin(task, True, angles, condition, None)
+    np.testing.assert_array_equal(unasked, units.offset(first))
+    given = jnp.full_like(first, jnp.nan).at[0].set(0.5)  # the first start brings an action
+    action, unasked = units.begin(task, True, angles, condition, given)
+    np.testing.assert_array_equal(action, jnp.stack([given[0], first[1]]))
+    np.testing.assert_array_equal(unasked, jnp.stack([jnp.zeros(49), units.offset(first)[1]]))
+    assert units.begin(CONFIG.task, True, angles, condition, given)[1] is None
 
 
 def test_without_limp_bodies_starts_on_a_plane_have_no_offsets(units, angles, condition):
@@ -86,6 +72,7 @@ def test_offsets_that_do_nothing_are_none(character, angles, condition):
 def test_without_a_prior_the_pose_is_held_whatever_the_sum(character, angles, condition):
     neutral = jnp.asarray(character.neutral_qpos[7:], jnp.float32)
     bare = ActionDecoder(None, SCALE, neutral)
-    np.testing.assert_allclose(
-        bare.target(bare.hold(angles, condition, 0.1), condition), angles, atol=1e-5
-    )
+    task = dataclasses.replace(CONFIG.task, limp_share=0.5)
+    first, unasked = bare.begin(task, True, angles, condition, None)
+    np.testing.assert_allclose(bare.target(first, condition), angles, atol=1e-5)
+    assert unasked is None  # without a prior no offset is unnatural

@@ -276,6 +276,23 @@ def test_offsets_cost_naturalness(jitted):
     np.testing.assert_allclose(output.terms["natural"], 1 - 0.49**2, rtol=1e-4)
 
 
+def test_offsets_that_hold_a_limp_body_cost_nothing_while_the_filter_forgets_them(
+    jitted, character
+):
+    config = dataclasses.replace(jitted.task.config, limp_share=1.0)
+    task = dataclasses.replace(jitted.task, config=config)
+    world = jitted.world.replace(prior=untrained_prior(character))  # no pose is near its own
+    rows, style = jnp.arange(B, dtype=jnp.int32), jnp.zeros(B, int)
+    state = compiled(task.start)(world, style, jnp.full(B, LYING), rows)
+    held = np.asarray(state.start_offset)
+    assert np.abs(held).sum(axis=1).min() > 1.0
+    idle = state.action.at[:, LATENT:].set(0.0)  # asks for no offset
+    after, output = compiled(task.advance)(world, state, idle)
+    np.testing.assert_allclose(after.start_offset, 0.8 * held, rtol=1e-5)
+    np.testing.assert_allclose(after.action[:, LATENT:], 0.8 * state.action[:, LATENT:], rtol=1e-5)
+    np.testing.assert_allclose(output.terms["natural"], 1.0, atol=1e-6)
+
+
 # Resets.
 
 

@@ -38,8 +38,7 @@ class ActionDecoder:
 
     def target(self, action: jax.Array, condition: jax.Array) -> jax.Array:
         """Servo target [..., J] (rad), not clipped, of actions [..., A] under curves [..., 3]."""
-        offset = action[..., self.latent_size :]
-        return self.pose(action, condition) + self.offset_scale * offset
+        return self.pose(action, condition) + self.offset(action)
 
     def action(self, pose: jax.Array, target: jax.Array, condition: jax.Array) -> jax.Array:
         """The action [..., A] with that target [..., J], its latent being the one of `pose`."""
@@ -64,29 +63,40 @@ class ActionDecoder:
     ) -> jax.Array:
         """The action [..., A] that a start's filter holds, for its pose angles [..., J].
 
-        The prior knows no feet turned to a slope, nor limp bodies: without offsets, the servos
-        would push the former over and throw the latter about. With all of them the reward of limp
-        bodies would be 0 at first, see `rewards.natural`.
+        The prior knows no feet turned to a slope, nor limp bodies: where such starts are, offsets
+        hold the pose exactly, since the servos would push the former over and throw the latter
+        about with half of their hinges at the torque limit. Else the latent pose alone holds it.
         """
-        if config.limp_share > 0:
-            return self.hold(angles, condition, config.offset_limit_rad)
-        if flat:
-            return self.nearest(angles, condition)
-        return self.action(angles, angles, condition)
+        if _exact(config, flat):
+            return self.action(angles, angles, condition)
+        return self.nearest(angles, condition)
 
-    def hold(self, angles: jax.Array, condition: jax.Array, most_rad: float) -> jax.Array:
-        """The action [..., A] whose target is the pose angles [..., J], or near it.
+    def begin(
+        self,
+        config: TaskConfig,
+        flat: bool,
+        angles: jax.Array,
+        condition: jax.Array,
+        given: jax.Array | None,
+    ) -> tuple[jax.Array, jax.Array | None]:
+        """What the filters of starts [B] hold: actions [B, A], and offsets [B, J] (rad) of theirs.
 
-        By latent pose and offsets. With a prior, these are scaled down where their sum |dq|_1 would
-        exceed most_rad.
+        given [B, A]: actions that come with the starts, NaN where none does; None: with no start.
+        The offsets are those that nobody asked for, since they hold the pose alone, see `first`;
+        None: there are none.
         """
-        exact = self.action(angles, angles, condition)
-        if self.prior is None:
-            return exact
-        latent, offset = exact[..., : self.latent_size], exact[..., self.latent_size :]
-        total = self.offset_scale * jnp.abs(offset).sum(axis=-1, keepdims=True)
-        share = most_rad / jnp.maximum(total, most_rad)
-        return jnp.concatenate([latent, share * offset], axis=-1)
+        action = self.first(config, flat, angles, condition)
+        unasked = self.offset(action) if _exact(config, flat) and self.prior is not None else None
+        if given is None:
+            return action, unasked
+        none = jnp.isnan(given)
+        if unasked is not None:
+            unasked = jnp.where(none[:, -1:], unasked, 0.0)
+        return jnp.where(none, action, given), unasked
+
+    def offset(self, action: jax.Array) -> jax.Array:
+        """The offsets [..., J] (rad) in actions [..., A]."""
+        return self.offset_scale * action[..., self.latent_size :]
 
     def latent(self, angles: jax.Array, condition: jax.Array) -> jax.Array:
         """The latent parts [..., Z] that the prior encodes poses [..., J] by."""
@@ -104,6 +114,11 @@ class ActionDecoder:
             return False
         ours, theirs = (jax.tree.leaves(_arrays(decoder)) for decoder in (self, other))
         return len(ours) == len(theirs) and all(map(np.array_equal, ours, theirs))
+
+
+def _exact(config: TaskConfig, flat: bool) -> bool:
+    """Whether offsets hold the start poses."""
+    return config.limp_share > 0 or not flat
 
 
 def _arrays(decoder: ActionDecoder) -> object:

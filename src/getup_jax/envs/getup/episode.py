@@ -64,6 +64,8 @@ class EpisodeState:
     # [B] s, time on the curve at which a short episode is cut, inf: at its end; None: all are
     until: jax.Array | None = None
     lift: jax.Array | None = None  # [B] N, most of the assistive wrench; None: there is none
+    # [B, J] rad, what the filter has left of the offsets that held the start pose; None: of none
+    start_offset: jax.Array | None = None
     # Irregular ground only; None on a flat plane.
     region: jax.Array | None = None  # [B] int32, where the episode started
     curriculum: CurriculumState | None = None  # of the whole batch

@@ -173,11 +173,9 @@ class GetUpTask:
         # The filter keeps most of the last action, so the first target must be the start pose.
         angles, condition = physics.kinematics.qpos[:, 7:], self.targets(state)[:, 0]
         flat = self.terrain is None
-        hold = self.decoder(world).first(self.config, flat, angles, condition)
-        if world.pool.action is not None:
-            given = world.pool.action[index]
-            hold = jnp.where(jnp.isnan(given), hold, given)
-        state = state.replace(action=hold)
+        given = None if world.pool.action is None else world.pool.action[index]
+        action, unasked = self.decoder(world).begin(self.config, flat, angles, condition, given)
+        state = state.replace(action=action, start_offset=unasked)
         return state.replace(observation=self._observe(state, self._posture(world, state)))
 
     def advance(
@@ -191,6 +189,9 @@ class GetUpTask:
         state = state.replace(
             physics=physics, action=filtered, time=state.time + self.engine.control_dt
         )
+        if state.start_offset is not None:
+            left = (1.0 - self.config.filter) * state.start_offset
+            state = state.replace(start_offset=left)
         posture = self._posture(world, state)
         target = self.targets(state)[:, 0]
         terms = self._reward_terms(world, state, posture, target)
@@ -279,7 +280,10 @@ class GetUpTask:
             terms["track"] = rewards.tracking(terms, sharpness, of_height)
         if world.prior is None:  # nothing that offsets could be unnatural to [P 6.4]
             return terms
-        terms["natural"] = rewards.natural(self._offset(state), config.offset_limit_rad)
+        offset = self._offset(state)
+        if state.start_offset is not None:  # nobody asked for those
+            offset = offset - state.start_offset
+        terms["natural"] = rewards.natural(offset, config.offset_limit_rad)
         terms["total"] = terms["total"] * terms["natural"]
         return terms
 
