@@ -367,7 +367,7 @@ def test_an_action_that_is_not_finite_ends_its_episode_and_no_later_one(jitted, 
         assert all(np.isfinite(x).all() for x in (output.final_observation, after.observation))
         assert np.isfinite(output.reward).all()
         after, output = jitted.step(jitted.world, after, after.action)
-    assert not output.ended["not_finite"].any()
+        assert not output.ended["not_finite"].any()
 
 
 def test_the_same_key_gives_the_same_run(jitted):
