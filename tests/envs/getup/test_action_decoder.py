@@ -44,6 +44,12 @@ def test_a_limp_body_is_held_exactly_however_far_from_the_prior(units, angles, c
         np.testing.assert_allclose(units.target(first, condition), angles, atol=1e-5)
 
 
+def test_a_pose_with_noise_is_held_exactly(units, angles, condition):
+    task = dataclasses.replace(CONFIG.task, start_noise_rad=0.1)
+    first = units.first(task, True, angles, condition)
+    np.testing.assert_allclose(units.target(first, condition), angles, atol=1e-5)
+
+
 def test_the_offsets_that_hold_a_start_pose_are_nobodys(units, angles, condition):
     task = dataclasses.replace(CONFIG.task, limp_share=0.5)
     first, unasked = units.begin(task, True, angles, condition, None)

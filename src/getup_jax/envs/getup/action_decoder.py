@@ -63,9 +63,10 @@ class ActionDecoder:
     ) -> jax.Array:
         """The action [..., A] that a start's filter holds, for its pose angles [..., J].
 
-        The prior knows no feet turned to a slope, nor limp bodies: where such starts are, offsets
-        hold the pose exactly, since the servos would push the former over and throw the latter
-        about with half of their hinges at the torque limit. Else the latent pose alone holds it.
+        The prior knows no feet turned to a slope, nor limp bodies, nor noise on the hinges: where
+        such starts are, offsets hold the pose exactly, since the servos would push the first over
+        and throw the others about with half of their hinges at the torque limit. Else the latent
+        pose alone holds it.
         """
         if _exact(config, flat):
             return self.action(angles, angles, condition)
@@ -118,7 +119,7 @@ class ActionDecoder:
 
 def _exact(config: TaskConfig, flat: bool) -> bool:
     """Whether offsets hold the start poses."""
-    return config.limp_share > 0 or not flat
+    return config.limp_share > 0 or config.start_noise_rad > 0 or not flat
 
 
 def _arrays(decoder: ActionDecoder) -> object:
