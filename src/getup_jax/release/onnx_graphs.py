@@ -109,10 +109,10 @@ def _observation(
 def _start(
     parts: PolicyParts, qpos: jax.Array, points: jax.Array, duration: jax.Array, time: jax.Array
 ) -> jax.Array:
-    """The action [N, A] whose servo target is the pose [N, 7 + J] itself, or near it."""
+    """The action [N, A] whose servo target is the pose [N, 7 + J] itself."""
     task = parts.task
     condition = _targets(task, points, duration, time)[..., 0, :]
-    return parts.decoder.first(task.config, task.terrain is None, qpos[..., 7:], condition)
+    return parts.decoder.first(qpos[..., 7:], condition)
 
 
 def _targets(task: GetUpTask, points: jax.Array, duration: jax.Array, time: jax.Array) -> jax.Array:

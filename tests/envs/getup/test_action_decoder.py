@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
-
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -36,36 +34,19 @@ def sums(action) -> np.ndarray:
     return SCALE * np.abs(np.asarray(action)[:, LATENT:]).sum(axis=1)
 
 
-def test_a_limp_body_is_held_exactly_however_far_from_the_prior(units, angles, condition):
-    task = dataclasses.replace(CONFIG.task, limp_share=0.5)
-    assert sums(units.action(angles, angles, condition)).max() > LIMIT
-    for flat in (True, False):
-        first = units.first(task, flat, angles, condition)
-        np.testing.assert_allclose(units.target(first, condition), angles, atol=1e-5)
-
-
-def test_a_pose_with_noise_is_held_exactly(units, angles, condition):
-    task = dataclasses.replace(CONFIG.task, start_noise_rad=0.1)
-    first = units.first(task, True, angles, condition)
+def test_a_start_is_held_exactly_however_far_from_the_prior(units, angles, condition):
+    first = units.first(angles, condition)
+    assert sums(first).max() > LIMIT
     np.testing.assert_allclose(units.target(first, condition), angles, atol=1e-5)
 
 
 def test_the_offsets_that_hold_a_start_pose_are_nobodys(units, angles, condition):
-    task = dataclasses.replace(CONFIG.task, limp_share=0.5)
-    first, unasked = units.begin(task, True, angles, condition, None)
+    first, unasked = units.begin(angles, condition, None)
     np.testing.assert_array_equal(unasked, units.offset(first))
     given = jnp.full_like(first, jnp.nan).at[0].set(0.5)  # the first start brings an action
-    action, unasked = units.begin(task, True, angles, condition, given)
+    action, unasked = units.begin(angles, condition, given)
     np.testing.assert_array_equal(action, jnp.stack([given[0], first[1]]))
     np.testing.assert_array_equal(unasked, jnp.stack([jnp.zeros(49), units.offset(first)[1]]))
-    assert units.begin(CONFIG.task, True, angles, condition, given)[1] is None
-
-
-def test_without_limp_bodies_starts_on_a_plane_have_no_offsets(units, angles, condition):
-    first = units.first(CONFIG.task, True, angles, condition)
-    np.testing.assert_array_equal(sums(first), 0.0)
-    uneven = units.first(CONFIG.task, False, angles, condition)
-    np.testing.assert_allclose(units.target(uneven, condition), angles, atol=1e-5)
 
 
 def test_offsets_that_do_nothing_are_none(character, angles, condition):
@@ -78,7 +59,6 @@ def test_offsets_that_do_nothing_are_none(character, angles, condition):
 def test_without_a_prior_the_pose_is_held_whatever_the_sum(character, angles, condition):
     neutral = jnp.asarray(character.neutral_qpos[7:], jnp.float32)
     bare = ActionDecoder(None, SCALE, neutral)
-    task = dataclasses.replace(CONFIG.task, limp_share=0.5)
-    first, unasked = bare.begin(task, True, angles, condition, None)
+    first, unasked = bare.begin(angles, condition, None)
     np.testing.assert_allclose(bare.target(first, condition), angles, atol=1e-5)
     assert unasked is None  # without a prior no offset is unnatural

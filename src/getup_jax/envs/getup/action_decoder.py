@@ -8,7 +8,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from getup_jax.config import TaskConfig
 from getup_jax.pose_prior import prior as pose_prior
 from getup_jax.pose_prior.prior import PosePrior
 
@@ -58,36 +57,26 @@ class ActionDecoder:
         latent = self.latent(angles, condition)
         return jnp.concatenate([latent, jnp.zeros_like(angles)], axis=-1)
 
-    def first(
-        self, config: TaskConfig, flat: bool, angles: jax.Array, condition: jax.Array
-    ) -> jax.Array:
-        """The action [..., A] that a start's filter holds, for its pose angles [..., J].
+    def first(self, angles: jax.Array, condition: jax.Array) -> jax.Array:
+        """The action [..., A] that a start's filter holds: its target is the pose angles [..., J].
 
-        The prior knows no feet turned to a slope, nor limp bodies, nor noise on the hinges: where
-        such starts are, offsets hold the pose exactly, since the servos would push the first over
-        and throw the others about with half of their hinges at the torque limit. Else the latent
-        pose alone holds it.
+        By offsets too, as the prior knows no feet turned to a slope, nor limp bodies, noise on the
+        hinges or other people's motions: its own pose nearest to theirs would make the servos push
+        the first over, and throw the others about with half of the hinges at the torque limit.
         """
-        if _exact(config, flat):
-            return self.action(angles, angles, condition)
-        return self.nearest(angles, condition)
+        return self.action(angles, angles, condition)
 
     def begin(
-        self,
-        config: TaskConfig,
-        flat: bool,
-        angles: jax.Array,
-        condition: jax.Array,
-        given: jax.Array | None,
+        self, angles: jax.Array, condition: jax.Array, given: jax.Array | None
     ) -> tuple[jax.Array, jax.Array | None]:
         """What the filters of starts [B] hold: actions [B, A], and offsets [B, J] (rad) of theirs.
 
         given [B, A]: actions that come with the starts, NaN where none does; None: with no start.
         The offsets are those that nobody asked for, since they hold the pose alone, see `first`;
-        None: there are none.
+        None: without a prior, where no offset is unnatural.
         """
-        action = self.first(config, flat, angles, condition)
-        unasked = self.offset(action) if _exact(config, flat) and self.prior is not None else None
+        action = self.first(angles, condition)
+        unasked = None if self.prior is None else self.offset(action)
         if given is None:
             return action, unasked
         none = jnp.isnan(given)
@@ -115,11 +104,6 @@ class ActionDecoder:
             return False
         ours, theirs = (jax.tree.leaves(_arrays(decoder)) for decoder in (self, other))
         return len(ours) == len(theirs) and all(map(np.array_equal, ours, theirs))
-
-
-def _exact(config: TaskConfig, flat: bool) -> bool:
-    """Whether offsets hold the start poses."""
-    return config.limp_share > 0 or config.start_noise_rad > 0 or not flat
 
 
 def _arrays(decoder: ActionDecoder) -> object:

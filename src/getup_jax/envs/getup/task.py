@@ -172,9 +172,8 @@ class GetUpTask:
         )
         # The filter keeps most of the last action, so the first target must be the start pose.
         angles, condition = physics.kinematics.qpos[:, 7:], self.targets(state)[:, 0]
-        flat = self.terrain is None
         given = None if world.pool.action is None else world.pool.action[index]
-        action, unasked = self.decoder(world).begin(self.config, flat, angles, condition, given)
+        action, unasked = self.decoder(world).begin(angles, condition, given)
         state = state.replace(action=action, start_offset=unasked)
         return state.replace(observation=self._observe(state, self._posture(world, state)))
 
