@@ -51,6 +51,7 @@ class NumpyGetUp(gymnasium.Env):
         self._derive()
         self._time, self._duration = float(c["time"][index]), float(c["duration"][index])
         self._points, self._action = c["points"][index], c["action"][index].copy()
+        self._unasked = self._offset()  # holds the start pose, and is not counted
         self._ahead = self._curve()
         self._low = self._head = 0
         self._ratios: list[float] = []
@@ -59,6 +60,7 @@ class NumpyGetUp(gymnasium.Env):
         """One control step."""
         c = self._c
         self._action = c["filter"] * action + (1.0 - c["filter"]) * self._action
+        self._unasked = (1.0 - c["filter"]) * self._unasked
         self.data.ctrl[:] = self._target(self._ahead[0])
         mujoco.mj_step(self.model, self.data, nstep=int(c["substeps"]))
         self._derive()
@@ -103,7 +105,7 @@ class NumpyGetUp(gymnasium.Env):
         pose = (x @ c["kernel_out"] + c["bias_out"]) * c["angle_std"] + c["angle_mean"]
         if len(rows) == 2:
             pose = 0.5 * (pose[:1] + pose[1:, c["mirror_index"]] * c["mirror_sign"])
-        target = pose[0] + c["offset_scale"] * self._action[size:]
+        target = pose[0] + self._offset()
         return np.clip(target, c["target_lower"], c["target_upper"])
 
     def _posture(self) -> dict[str, np.ndarray]:
@@ -136,6 +138,10 @@ class NumpyGetUp(gymnasium.Env):
         blocks = [*posture.values(), self._ahead, self._action]
         return np.concatenate([block.ravel() for block in blocks]).astype(np.float32)
 
+    def _offset(self) -> np.ndarray:
+        """Hinge offsets [J] (rad) of the filtered action."""
+        return self._c["offset_scale"] * self._action[self._c["latent_mean"].size :]
+
     def _reward(self, posture: dict[str, np.ndarray], target: np.ndarray) -> tuple[float, float]:
         """The task reward and that of natural offsets [P equations 3 to 9]."""
         c, value = self._c, posture["features"]
@@ -146,7 +152,7 @@ class NumpyGetUp(gymnasium.Env):
         orientation = np.exp(-1.5 * np.abs(value[1:] - target[1:]).sum())
         velocity = 1.0 - alpha + alpha * np.exp(-0.05 * np.linalg.norm(posture["omega"]))
         pose = 1.0 - alpha + alpha * np.exp(-0.1 * angle.sum())
-        offset = c["offset_scale"] * np.abs(self._action[c["latent_mean"].size :]).sum()
+        offset = np.abs(self._offset() - self._unasked).sum()
         natural = 1.0 - min((offset / c["offset_limit_rad"]) ** 2, 1.0)
         return height * orientation * velocity * pose, natural
 
