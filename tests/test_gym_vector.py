@@ -10,7 +10,7 @@ from getup_jax.config import ConfigError
 from gym_samples import noise, small
 
 gymnasium = pytest.importorskip("gymnasium")
-SIZE, STEPS = 6, 45
+SIZE, STEPS = 6, 75
 
 
 @pytest.fixture(scope="module")

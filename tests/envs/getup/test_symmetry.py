@@ -157,7 +157,9 @@ def test_a_state_and_its_image_stay_images_under_the_policy(task, learner):
     state = jax.jit(env.start)(world, jnp.arange(2), *jnp.zeros((2, 2), jnp.int32))
     action = 0.3 * jax.random.normal(jax.random.PRNGKey(3), (65,))
     first = jnp.stack([action, found.action(action)])
-    state = state.replace(physics=env.engine.place(qpos, 0.3 * qvel), action=first)
+    none = jnp.zeros_like(state.start_offset)  # those of the start are of another pose
+    placed = env.engine.place(qpos, 0.3 * qvel)
+    state = state.replace(physics=placed, action=first, start_offset=none)
     state, _ = jax.jit(env.advance)(world, state, first)  # now it is observed
     policy = jax.jit(learner.init_learner)(jax.random.PRNGKey(0)).policy
     # the first actions are nearly zero
