@@ -16,13 +16,13 @@ import itertools
 import json
 import math
 import time
-from pathlib import Path
 
 import numpy as np
 
 from getup_jax.editor.steer.character import Character
 from getup_jax.editor.steer.policies import Policies, choose
 from getup_jax.evaluation.metrics import wilson
+from getup_jax.evaluation.options import natural, output
 from getup_jax.runtime.checkpoint import load_policy
 from support.command import command, positive
 
@@ -39,8 +39,8 @@ def main() -> None:
     add("getup", nargs="?", metavar="RUN", help="what `getup-eval --ckpt` takes: gets up")
     add("--ckpt", nargs="+", default=["walk", "walk_aim", "wave_squat"], help="what falls")
     add("--falls", type=positive, default=100, help="in all (default: 100)")
-    add("--seed", type=int, default=0)
-    add("--json", type=Path, metavar="FILE", help="write the result to this file")
+    add("--seed", type=natural, default=0)
+    add("--json", type=output(".json"), metavar="FILE", help="write the result to this file")
     add("--quick", action="store_true", help="for `make bench`: one fall")
     args = parser.parse_args()
     if args.getup is None:

@@ -132,7 +132,7 @@ class Roller:
     ) -> Trace:
         env, kinematics = self.env, state.physics.kinematics
         verdict = "stand_success" if self.kind == STANDING else "success"
-        offset = env.config.offset_scale * state.action[:, env.latent_size :]
+        offset = env.decoder(world).offset(state.action)
         limit = jnp.asarray(env.character.torque_limit, jnp.float32)
         return Trace(
             features=env.observer.posture(kinematics, world.terrain).features,

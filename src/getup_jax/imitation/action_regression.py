@@ -157,6 +157,6 @@ def compare(
     """How far the policy's servo targets are from the demos' (degrees, rms), and |dq|_1 (rad)."""
     action = jax.jit(learner.act)(policy, demos.observation)
     miss = jnp.mean(jnp.square(decoder.target(action, demos.condition) - demos.target))
-    offset = decoder.offset_scale * action[:, decoder.latent_size :]
+    offset = decoder.offset(action)
     length = jnp.mean(jnp.sum(jnp.abs(offset), axis=-1))
     return math.degrees(math.sqrt(miss)), float(length)

@@ -113,8 +113,8 @@ class Follower:
         value = env.observer.posture(kinematics, world.terrain).features
         target = env.targets(state)[:, 0]
         gap = jnp.sum(jnp.abs(value - target) / FEATURE_SCALE, axis=-1)
-        offset = env.config.offset_scale * jnp.abs(state.action[:, env.latent_size :])
-        unnatural = (jnp.sum(offset, axis=-1) / env.config.offset_limit_rad) ** 2
+        asked = env.decoder(world).asked(state.action, state.start_offset)
+        unnatural = (jnp.sum(jnp.abs(asked), axis=-1) / env.config.offset_limit_rad) ** 2
         cost = jnp.where(kinematics.finite, gap + unnatural, _FAILED)
         return state.replace(key=None), cost, output.terminated, Steps(value, target, state.time)
 

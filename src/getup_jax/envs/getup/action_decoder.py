@@ -88,6 +88,14 @@ class ActionDecoder:
         """The offsets [..., J] (rad) in actions [..., A]."""
         return self.offset_scale * action[..., self.latent_size :]
 
+    def asked(self, action: jax.Array, start_offset: jax.Array | None) -> jax.Array:
+        """Those of filtered actions [..., A] that were asked for: without what `begin` left.
+
+        start_offset [..., J] (rad): that; None: there is none.
+        """
+        offset = self.offset(action)
+        return offset if start_offset is None else offset - start_offset
+
     def latent(self, angles: jax.Array, condition: jax.Array) -> jax.Array:
         """The latent parts [..., Z] that the prior encodes poses [..., J] by."""
         if self.prior is None:

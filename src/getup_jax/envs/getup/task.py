@@ -195,7 +195,7 @@ class GetUpTask:
         target = self.targets(state)[:, 0]
         terms = self._reward_terms(world, state, posture, target)
         if self.config.rewards:
-            own = self._user_terms(state, posture, target)
+            own = self._user_terms(world, state, posture, target)
             terms |= own | {"total": math.prod(own.values(), start=terms["total"])}
         finite = physics.kinematics.finite & jnp.isfinite(filtered).all(axis=-1)  # it would stay
         terms = {name: jnp.where(finite, value, 0.0) for name, value in terms.items()}
@@ -279,15 +279,13 @@ class GetUpTask:
             terms["track"] = rewards.tracking(terms, sharpness, of_height)
         if world.prior is None:  # nothing that offsets could be unnatural to [P 6.4]
             return terms
-        offset = self._offset(state)
-        if state.start_offset is not None:  # nobody asked for those
-            offset = offset - state.start_offset
-        terms["natural"] = rewards.natural(offset, config.offset_limit_rad)
+        asked = self.decoder(world).asked(state.action, state.start_offset)
+        terms["natural"] = rewards.natural(asked, config.offset_limit_rad)
         terms["total"] = terms["total"] * terms["natural"]
         return terms
 
     def _user_terms(
-        self, state: EpisodeState, posture: Posture, target: jax.Array
+        self, world: World, state: EpisodeState, posture: Posture, target: jax.Array
     ) -> dict[str, jax.Array]:
         """Those of `task.rewards`, which are factors of the total."""
         inputs = RewardInputs(
@@ -295,10 +293,6 @@ class GetUpTask:
             posture=posture,
             target=target,
             phase=state.time / state.duration,
-            offset=self._offset(state),
+            offset=self.decoder(world).offset(state.action),
         )
         return user_rewards.terms(self.config.rewards, inputs)
-
-    def _offset(self, state: EpisodeState) -> jax.Array:
-        """Servo offsets [B, J] (rad) of the filtered actions."""
-        return self.config.offset_scale * state.action[:, self.latent_size :]
