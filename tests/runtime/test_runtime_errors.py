@@ -30,6 +30,11 @@ def test_a_lost_process_is_one_line():
     assert translated(b"warning: before\n" + ACCOUNT) == "warning: before\n" + LOST
 
 
+def test_a_process_that_has_said_so_itself_is_one_line_too():
+    own = "ProcessError: process 1 of 2: another process of this run is gone (why); start again\n"
+    assert translated(own.encode() + ACCOUNT) == own
+
+
 def test_everything_else_passes():
     text = b"Traceback (most recent call last):\n  1\n\nE1129 12:00:00.1 2 other.cc:1] why\n1\nend"
     assert translated(text) == text.decode()

@@ -35,12 +35,17 @@ def translate_stderr() -> None:
 
 
 def translate(source: IO[bytes], target: IO[bytes]) -> None:
-    """Copy lines until the source ends, with LOST for the runtime's account of a lost process."""
-    noise = False
+    """Copy lines until the source ends, with LOST for the runtime's account of a lost process.
+
+    Where this process has said so itself, because its own thread noticed first, it is not repeated.
+    """
+    noise = said = False
     for line in source:
+        said |= line.startswith(b"ProcessError: ")
         if _FATAL.match(line):
-            target.write(LOST.encode())
-            target.flush()
+            if not said:
+                target.write(LOST.encode())
+                target.flush()
             source.read()  # the rest is the stack
             return
         noise = bool(_NOISE.match(line) or (noise and _MORE_NOISE.match(line)))
