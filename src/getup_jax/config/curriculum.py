@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 from getup_jax.config.check import require
 from getup_jax.config.ranges import check_numbers, number
@@ -49,6 +50,12 @@ class CurriculumConfig:
     curve_noise: float = number(1.0, least=0, most=10)
     # of drawn curves: T x U(low, high)
     duration_range: tuple[float, float] = number((0.75, 1.3), above=0, most=100, length=2)
+    # share of the drawn curves that go over to a style which may start otherwise ...
+    style_transitions: float = number(0.0, least=0, most=1)
+    # ... by up to this, in both angles of the torso: 1.2 is from a side to prone
+    transition_rad: float = number(1.2, least=0, most=math.pi)
+    # share of the drawn curves of lying starts that begin where the body is, not with their style
+    start_at_pose: float = number(0.0, least=0, most=1)
     # product: all reward terms multiplied, with one critic | terms: each with a critic of its own
     objectives: str = "product"
     # exponent on the height and orientation terms of the reward; 1: as in the paper. Early ends,

@@ -19,6 +19,7 @@ from getup_jax.envs.getup.drawn_curves import (
     covered_height,
     draw_curves,
     fastest_rise,
+    fastest_turn,
     mirrored,
     smooth_noise,
     style_curve,
@@ -145,16 +146,81 @@ def test_the_first_angles_stay_within_reach_of_the_start_pose():
     assert gap <= 0.5 * MATCH_RAD
 
 
+# Styles that go over to others, and curves that begin at the pose.
+
+
+def still(**changes) -> CurriculumConfig:
+    return dataclasses.replace(ALL, curve_noise=0.0, **changes)
+
+
+def test_a_transition_leaves_one_style_and_ends_as_another():
+    two = np.array([SUPINE, SIDE])
+    exact = Styles(LIBRARY.points[two], LIBRARY.duration[two])
+    config = still(style_transitions=1.0, transition_rad=np.pi)
+    drawn = draw(config, library=exact)
+    points = np.asarray(drawn.points[::2])  # those of the supine style
+    supine, side = np.asarray(exact.points)
+    gone = points[:, 6, 1] < np.pi / 2 - 0.01  # the supine one has pi / 2
+    assert 0.2 < gone.mean() < 0.3  # of four partners, which are the two and their images
+    np.testing.assert_allclose(points[:, :2], np.broadcast_to(supine[:2], (len(points), 2, 3)))
+    np.testing.assert_allclose(points[gone][:, 6:], np.broadcast_to(side[6:], (gone.sum(), 3, 3)))
+
+
+def test_transitions_go_no_further_than_is_set():
+    near = of(draw(still(style_transitions=1.0, transition_rad=0.6)), SUPINE)
+    assert (near.points[..., 2] <= np.pi / 2 + 1e-5).all()  # none to prone
+    without = draw(still())
+    few = draw(still(style_transitions=0.3))
+    same = (np.asarray(few.points) == np.asarray(without.points)).all(axis=(1, 2))
+    assert 0.7 - 0.02 < same.mean() < 1.0
+
+
+def test_no_transition_turns_faster_than_the_library():
+    config = still(style_transitions=1.0, transition_rad=np.pi, duration_range=(0.5, 0.5))
+    fastest = np.asarray(fastest_turn(LIBRARY.points, LIBRARY.duration)).max() / 0.5
+    drawn = draw(config)
+    turns = np.asarray(fastest_turn(drawn.points, drawn.duration))
+    assert fastest * 0.99 < turns.max() < fastest * 1.001
+
+
+def test_a_fast_turn_is_the_largest_step_of_an_angle():
+    points = np.zeros((1, NUM_POINTS, 3))
+    points[0, 4:, 1] = -0.5
+    points[0, 6:, 2] = 0.3
+    points[0, :, 0] = 9.0 * np.arange(NUM_POINTS)  # heights are no angles
+    np.testing.assert_allclose(fastest_turn(jnp.asarray(points), jnp.asarray([2.0])), 0.5 * 8 / 2)
+
+
+def test_a_curve_that_begins_at_the_pose_joins_the_drawn_one():
+    pose = jnp.broadcast_to(jnp.asarray([0.2, 1.0, 0.5]), (B, 3))
+    drawn = draw(still(start_at_pose=0.5))
+    points = np.asarray(drawn.from_pose(pose))
+    moved = (points != np.asarray(drawn.points)).any(axis=(1, 2))
+    assert abs(moved.mean() - 0.5) < 0.03
+    np.testing.assert_allclose(points[moved][:, 0], pose[moved], atol=1e-6)
+    gap = points - np.asarray(drawn.points)
+    np.testing.assert_allclose(gap[moved][:, 1], gap[moved][:, 0], atol=1e-6)  # and its slope
+    np.testing.assert_array_equal(gap[:, 6:], 0.0)
+    shrinks = np.diff(np.abs(gap), axis=1)
+    assert (shrinks <= 1e-6).all()
+    np.testing.assert_array_equal(drawn.points, draw(still()).points)  # the same draws
+
+
+def test_episodes_that_do_not_start_lying_keep_their_curves():
+    drawn = draw(still(start_at_pose=1.0), kind=CLIP)
+    pose = jnp.zeros((B, 3))
+    np.testing.assert_array_equal(drawn.from_pose(pose), drawn.points)
+
+
 # The duration.
 
 
 def test_durations_are_in_the_range_that_is_set():
-    still = dataclasses.replace(ALL, curve_noise=0.0)
-    scale = np.asarray(draw(still, library=alone(PRONE)).duration) / 4.0
+    scale = np.asarray(draw(still(), library=alone(PRONE)).duration) / 4.0
     assert 0.75 <= scale.min() < 0.76
     assert 1.29 < scale.max() <= 1.3
     assert abs(scale.mean() - 1.025) < 0.01
-    exact = dataclasses.replace(still, duration_range=(1.0, 1.0))
+    exact = still(duration_range=(1.0, 1.0))
     np.testing.assert_allclose(draw(exact, library=alone(PRONE)).duration, 4.0, rtol=1e-6)
 
 
@@ -255,6 +321,17 @@ def test_starts_along_the_clip_keep_their_phase(built):
     np.testing.assert_array_equal(after.points, other.points)
 
 
+def test_lying_starts_may_begin_where_the_body_is(character):
+    config = changed(drawn_curves=1.0, start_at_pose=1.0, reference_start=0.3)
+    built = tiny_task(character, config)
+    env, world = built.environment, built.world
+    state = jax.jit(env.init, static_argnums=2)(world, KEY, 64)
+    features = env.observer.posture(state.physics.kinematics, world.terrain).features
+    lying = np.asarray(state.kind) == LYING
+    assert 10 < lying.sum() < 64
+    np.testing.assert_allclose(env.targets(state)[lying, 0], features[lying], atol=1e-5)
+
+
 def test_an_episode_that_starts_anew_gets_a_curve_of_its_own(character):
     built = tiny_task(character, changed(drawn_curves=1.0))
     env, world = built.environment, built.world
@@ -270,6 +347,9 @@ def test_an_episode_that_starts_anew_gets_a_curve_of_its_own(character):
     ("settings", "message"),
     [
         ({"drawn_curves": 1.5}, r"curriculum\.drawn_curves: expected .* from 0 to 1, got 1\.5"),
+        ({"style_transitions": 2.0}, r"curriculum\.style_transitions: expected .* from 0 to 1"),
+        ({"start_at_pose": -0.1}, r"curriculum\.start_at_pose: expected .* from 0 to 1"),
+        ({"transition_rad": 4.0}, r"curriculum\.transition_rad: expected .* from 0 to 3\.14"),
         ({"curve_noise": -1.0}, r"curriculum\.curve_noise: expected .* from 0 to 10, got -1\.0"),
         ({"duration_range": (1.3, 0.7)}, r"curriculum\.duration_range: .* the smaller one first"),
         (

@@ -155,6 +155,7 @@ class GetUpTask:
         size = len(getup)
         own = style_curve(world, getup)
         curve = own if curve is None else curve
+        features = self.observer.posture(physics.kinematics, world.terrain).features
         state = EpisodeState(
             physics=physics,
             observation=jnp.zeros((size, self.observation_size), jnp.float32),
@@ -162,7 +163,7 @@ class GetUpTask:
             getup=getup,
             kind=kind,
             time=world.pool.time[index] * (curve.duration / own.duration),
-            points=curve.points,
+            points=curve.from_pose(features),
             duration=curve.duration,
             low_steps=jnp.zeros(size, jnp.int32),
             head_steps=jnp.zeros(size, jnp.int32),
