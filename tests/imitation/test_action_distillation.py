@@ -82,7 +82,7 @@ def quickly(monkeypatch, rounds: int = 1) -> None:
     """Few and small demonstrations."""
     monkeypatch.setattr(action_distillation, "_ROUNDS", rounds)
     monkeypatch.setattr(action_distillation, "_SAMPLES", 896)
-    monkeypatch.setattr(action_regression, "_EPOCHS", 60)
+    monkeypatch.setattr(action_regression, "EPOCHS", 60)
     monkeypatch.setattr(action_regression, "_MINIBATCH", 64)
 
 

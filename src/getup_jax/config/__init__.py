@@ -76,6 +76,9 @@ class Config:
         share = self.task.stand_start + self.training_aids.reference_start
         expected = "at most 1"
         require(share <= 1, "task.stand_start + curriculum.reference_start", expected, share)
+        ok = self.terrain is not None or self.train.irregular_from is None
+        expected = "null on a flat plane; set terrain.curriculum, say"
+        require(ok, "train.irregular_from", expected, self.train.irregular_from)
         if self.composite is None:
             return
         expected = "null with composite motion, which is on a plane"

@@ -95,6 +95,8 @@ class TrainConfig:
     tensorboard: bool = False  # extra: tensorboard
     wandb: str | None = None  # project on Weights & Biases, extra: wandb; None: off
     init_from: str | None = None  # a checkpoint whose policy starts the run
+    # another one, which knows irregular ground and teaches there, where init_from knows a plane alone
+    irregular_from: str | None = None
     # also its critic, optimiser, curriculum and which starts are learned: the same task goes on
     # with another number of simulations or on another engine; `ppo.critic_first` is not needed
     init_learner: bool = False
@@ -103,3 +105,6 @@ class TrainConfig:
         check_numbers(self, "train")
         ok = self.init_from is not None or not self.init_learner
         require(ok, "train.init_learner", "train.init_from, whose learner it means", "none")
+        ok = self.irregular_from is None or (self.init_from is not None and not self.init_learner)
+        expected = "train.init_from, of a plane, and no train.init_learner"
+        require(ok, "train.irregular_from", expected, self.irregular_from)

@@ -54,6 +54,25 @@ class Teacher:
         """Mean actions [N, A] of its own decoder, for raw observations [N, O] of its own layout."""
         return self.model.mean(self.policy.actor, normalized(self.policy, observation))
 
+    def demonstrate(
+        self, env: GetUpTask, decoder: ActionDecoder, observation: jax.Array
+    ) -> Demonstrations:
+        """What it would do, for raw observations [N, O] of a task, as an action of that task."""
+        condition = env.observer.condition(observation)
+        action = observation[..., env.observer.slices()["action"]]
+        kept, places = _shared(self, env)
+        block = self.observer.slices()["action"]
+        seen = jnp.zeros((*observation.shape[:-1], self.observer.size))
+        seen = seen.at[..., kept].set(observation[..., places])
+        seen = seen.at[..., block].set(decoder.translate(action, condition, self.decoder))
+        mean = self.act(seen)
+        return Demonstrations(
+            observation=observation,
+            action=self.decoder.translate(mean, condition, decoder),
+            target=self.decoder.target(mean, condition),
+            condition=condition,
+        )
+
     def fits(self, learner: Learner) -> bool:
         """Whether its weights can be used there; what an action means may still differ."""
         env, model = learner.env, learner.model
@@ -67,7 +86,12 @@ class Teacher:
 
 
 def make_teacher(
-    config: Config, learner: Learner, world: World, loaded: LoadedPolicy, own: PolicyState
+    config: Config,
+    learner: Learner,
+    world: World,
+    loaded: LoadedPolicy,
+    own: PolicyState,
+    setting: str = "train.init_from",
 ) -> Teacher:
     """Of a loaded policy.
 
@@ -77,6 +101,7 @@ def make_teacher(
         world: of the new run.
         loaded: a checkpoint.
         own: the policy of the new run; with train.init_learner, it was loaded from there.
+        setting: which one names the checkpoint.
 
     Raises CheckpointError where the run cannot begin with the policy.
     """
@@ -85,7 +110,7 @@ def make_teacher(
     prior = pose_prior.from_checkpoint(loaded.prior)
     observer = _observer(env, loaded.config, prior)
     symmetry = find_symmetry(env.character, observer, prior)
-    _check(config, learner, world, loaded, prior, symmetry is not None)
+    _check(config, learner, world, loaded, prior, symmetry is not None, setting)
     latents = 0 if prior is None else prior.latent_size
     old = dataclasses.replace(env, observer=observer, symmetry=symmetry, latent_size=latents)
     model = make_actor_critic(old, loaded.config.network, config.ppo.normalize_observation)
@@ -117,9 +142,10 @@ def _check(
     loaded: LoadedPolicy,
     prior: PosePrior | None,
     was_mirrored: bool,
+    setting: str,
 ) -> None:
     """Raise CheckpointError where the run cannot begin with the policy and its prior."""
-    where = f"train.init_from: {loaded.path}:"
+    where = f"{setting}: {loaded.path}:"
     if (world.prior is None) != (prior is None):
         was, here = ("with", "has none") if world.prior is None else ("without", "has one")
         null = "leave out" if world.prior is None else "set"
@@ -171,7 +197,7 @@ def carry_over(
     if fits and teacher.decoder.same(decoder):
         return teacher.policy
     log("its networks, observation, prior or offsets are others: distilling it into this run's ...")
-    demonstrate = functools.partial(_demonstrate, teacher, env, decoder)
+    demonstrate = functools.partial(teacher.demonstrate, env, decoder)
     policy, seen = teacher.policy if fits else own, []
 
     def act(observation: jax.Array) -> jax.Array:
@@ -198,26 +224,6 @@ def carry_over(
         )
         act = functools.partial(learner.act, policy)
     return policy
-
-
-def _demonstrate(
-    teacher: Teacher, env: GetUpTask, decoder: ActionDecoder, observation: jax.Array
-) -> Demonstrations:
-    """What the teacher would do, for raw observations [N, O] of the new run, as an action of it."""
-    condition = env.observer.condition(observation)
-    action = observation[..., env.observer.slices()["action"]]
-    kept, places = _shared(teacher, env)
-    block = teacher.observer.slices()["action"]
-    seen = jnp.zeros((*observation.shape[:-1], teacher.observer.size))
-    seen = seen.at[..., kept].set(observation[..., places])
-    seen = seen.at[..., block].set(decoder.translate(action, condition, teacher.decoder))
-    mean = teacher.act(seen)
-    return Demonstrations(
-        observation=observation,
-        action=teacher.decoder.translate(mean, condition, decoder),
-        target=teacher.decoder.target(mean, condition),
-        condition=condition,
-    )
 
 
 def _shared(teacher: Teacher, env: GetUpTask) -> tuple[np.ndarray, np.ndarray]:

@@ -25,7 +25,7 @@ from getup_jax.rl.state import PolicyState
 Log = Callable[[str], None]
 
 _NOISE = 0.2  # standard deviation of the actions, to see what is beside the way, too
-_EPOCHS, _MINIBATCH = 30, 1024
+EPOCHS, _MINIBATCH = 30, 1024
 _LEARNING_RATES = 1e-3, 1e-5
 # Beside the squared error of the targets (rad^2):
 _NEAR = 0.02  # to the demonstrated latents, since others may decode to the same pose
@@ -106,8 +106,12 @@ def clone(
     decoder: ActionDecoder,
     demos: Demonstrations,
     key: jax.Array,
+    epochs: int | None = None,
 ) -> PolicyState:
-    """The policy after regression of its targets, with latents as far as they can say them."""
+    """The policy after regression of its targets, with latents as far as they can say them.
+
+    epochs: passes over the demonstrations; None: EPOCHS.
+    """
     latents, limit = decoder.latent_size, learner.env.config.offset_limit_rad
 
     def loss(actor: Any, part: Demonstrations) -> tuple[jax.Array, dict[str, jax.Array]]:
@@ -121,7 +125,7 @@ def clone(
         unnatural = jnp.mean(1.0 - rewards.natural(decoder.offset_scale * offset, limit))
         return miss + _NEAR * far + _NATURAL * unnatural, {"miss": miss}
 
-    actor = regress(loss, policy.actor, demos, key, _EPOCHS, _MINIBATCH)
+    actor = regress(loss, policy.actor, demos, key, epochs or EPOCHS, _MINIBATCH)
     return dataclasses.replace(policy, actor=actor)
 
 

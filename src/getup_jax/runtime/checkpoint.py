@@ -144,7 +144,7 @@ def export_policy(source: str | Path, destination: str | Path) -> Path:
     curriculum = loaded.config.curriculum
     if curriculum is not None:
         curriculum = dataclasses.replace(curriculum, archive=None)
-    own = {"init_from": None, "init_learner": False, "wandb": None}
+    own = {"init_from": None, "irregular_from": None, "init_learner": False, "wandb": None}
     train = dataclasses.replace(loaded.config.train, **own)
     physics = dataclasses.replace(loaded.config.physics, engine="auto")
     config = dataclasses.replace(loaded.config, physics=physics, curriculum=curriculum, train=train)

@@ -14,6 +14,7 @@ import jax
 import numpy as np
 
 from getup_jax.config import Config
+from getup_jax.config.check import require
 from getup_jax.envs.composite.build import BuiltComposite, build_composite
 from getup_jax.envs.composite.discriminator_rewards import make_discriminator_rewards
 from getup_jax.envs.composite.goals import equipment_of
@@ -24,6 +25,7 @@ from getup_jax.envs.getup.episode import with_shared
 from getup_jax.envs.getup.task import World
 from getup_jax.imitation import action_distillation
 from getup_jax.imitation.dagger import Setup, warm_start
+from getup_jax.imitation.irregular_distillation import distill_on_irregular
 from getup_jax.imitation.slope_warm_start import warm_start_on_slopes
 from getup_jax.physics.body_digest import body_digest, warn_if_other
 from getup_jax.physics.character import load_character
@@ -75,6 +77,11 @@ def _carry_over(learner: Learner, world: World, config: Config) -> CarryOver:
         key = jax.random.PRNGKey(config.seed)
         policy = action_distillation.carry_over(learner, world, policy, teacher, key, log)
         on_plane = learner.env.terrain is None or loaded.config.terrain is not None
+        if config.train.irregular_from is not None:
+            other = _knows_irregular_ground(config, loaded)
+            where = "train.irregular_from"
+            teacher = action_distillation.make_teacher(config, learner, world, other, policy, where)
+            return distill_on_irregular(learner, world, policy, teacher, key, log)
         if world.prior is None or on_plane:
             return policy
         return warm_start_on_slopes(learner, world, policy, key, log)
@@ -190,10 +197,22 @@ def _policy_to_begin_with(config: Config, log: Log) -> LoadedPolicy | None:
     if config.train.init_from is None:
         return None
     start = checkpoint.load_policy(config.train.init_from)
+    if config.train.irregular_from is not None:
+        _knows_irregular_ground(config, start)
     held = None if composite is None else equipment_of(composite.goals)
     body = body_digest(load_character(config.physics, equipment=held).model)
     warn_if_other(start.path, start.metadata, body, log)
     return start
+
+
+def _knows_irregular_ground(config: Config, start: LoadedPolicy) -> LoadedPolicy:
+    """That of `train.irregular_from`, where it knows what `train.init_from` does not."""
+    name, where = str(config.train.irregular_from), "train.irregular_from"
+    loaded = checkpoint.load_policy(name)
+    require(loaded.config.terrain is not None, where, "a policy of irregular ground", name)
+    expected = "none where train.init_from was trained on irregular ground itself"
+    require(start.config.terrain is None, where, expected, name)
+    return loaded
 
 
 def _finished(folder: Path, config: Config) -> bool:

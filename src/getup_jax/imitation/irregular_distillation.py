@@ -1,0 +1,102 @@
+"""Brings a policy of the plane and one of irregular ground together in one, before it trains there.
+
+To learn slopes from a policy that knows only the plane takes tens of millions of steps, and where
+another policy has made them, they need not be made again: each of the two teaches the new one on
+the ground that it knows (policy distillation from several teachers, Rusu et al. 2016), in the
+states that the new one gets to itself (DAgger, Ross et al. 2011). It begins with the weights of the
+first, as if the map were even.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+
+import jax
+import jax.numpy as jnp
+
+from getup_jax.envs.getup.task import GetUpTask, World
+from getup_jax.imitation import action_regression
+from getup_jax.imitation.action_distillation import Teacher
+from getup_jax.imitation.action_regression import Demonstrations, Log
+from getup_jax.rl.learner import Learner
+from getup_jax.rl.state import PolicyState
+
+_ROUNDS = 3
+_SAMPLES = 150_000  # at least, of each round, and of the plane alone; the last rollout is held out
+_EPOCHS = 10  # of a round; of the last one, as many as any regression has
+_EVEN_M = 1e-3  # differences within the height map, which rounding makes, too
+_FLAT_ONLY = {"curriculum": "success", "unlock_successes": 10**9}  # nothing else opens
+_ALL_OPEN = {"curriculum": "none"}
+
+
+def distill_on_irregular(
+    learner: Learner,
+    world: World,
+    policy: PolicyState,
+    teacher: Teacher,
+    key: jax.Array,
+    log: Log,
+) -> PolicyState:
+    """The policy, with an actor that does on irregular ground what the teacher does there.
+
+    Args:
+        learner: of the new run, on irregular ground.
+        world: of the new run.
+        policy: of the new run, from one that knows a plane alone.
+        teacher: a policy that was trained on irregular ground.
+        key: of the starts, the noise and the order of the minibatches.
+        log: gets a line for each round.
+    """
+    env = learner.env
+    assert isinstance(env, GetUpTask)
+    assert env.terrain is not None
+    log("it has trained on a plane: distilling what the other one does on irregular ground ...")
+    demonstrate = functools.partial(_demonstrate, learner, world, policy, teacher)
+    plane = env.with_terrain(dataclasses.replace(env.terrain, **_FLAT_ONLY))
+    anywhere = env.with_terrain(dataclasses.replace(env.terrain, **_ALL_OPEN))
+    rollouts = 1 + math.ceil(_SAMPLES / (learner.config.num_envs * learner.config.num_steps))
+    collect = functools.partial(action_regression.collect, learner)
+
+    def as_taught(observation: jax.Array) -> jax.Array:
+        return demonstrate(observation).action
+
+    key_plane, *keys = jax.random.split(key, 1 + _ROUNDS)
+    flat = collect(plane, world, as_taught, demonstrate, rollouts, key_plane)
+    flat, flat_heldout = action_regression.split(flat, len(flat.observation) // rollouts)
+    seen, act, decoder = [flat], as_taught, env.decoder(world)
+    for number, key_round in enumerate(keys, start=1):
+        key_roll, key_order = jax.random.split(key_round)
+        part = collect(anywhere, world, act, demonstrate, rollouts, key_roll)
+        training, heldout = action_regression.split(part, len(part.observation) // rollouts)
+        seen.append(training)
+        before, _ = action_regression.compare(learner, policy, decoder, heldout)
+        demos = action_regression.join(seen)
+        epochs = None if number == _ROUNDS else _EPOCHS
+        policy = action_regression.clone(learner, policy, decoder, demos, key_order, epochs)
+        after, _ = action_regression.compare(learner, policy, decoder, heldout)
+        on_plane, _ = action_regression.compare(learner, policy, decoder, flat_heldout)
+        log(
+            f"round {number} of {_ROUNDS}: its servo targets differ by {after:.2f} degrees (rms) "
+            f"now, {before:.1f} before, and on the plane by {on_plane:.2f}"
+        )
+        act = functools.partial(learner.act, policy)
+    return policy
+
+
+def _demonstrate(
+    learner: Learner, world: World, own: PolicyState, teacher: Teacher, observation: jax.Array
+) -> Demonstrations:
+    """What the two would do, each on its ground, for raw observations [N, O] of the new run."""
+    env = learner.env
+    assert isinstance(env, GetUpTask)
+    decoder, observer = env.decoder(world), env.observer
+    even = observer.evened(observation)
+    condition = observer.condition(observation)
+    action = learner.act(own, even)
+    target = decoder.target(action, condition)
+    here = Demonstrations(observation, action, target, condition)
+    there = teacher.demonstrate(env, decoder, observation)
+    irregular = jnp.any(jnp.abs(even - observation) > _EVEN_M, axis=-1)
+    return jax.tree.map(lambda a, b: jnp.where(irregular[:, None], a, b), there, here)
