@@ -95,7 +95,7 @@ class TrainConfig:
     tensorboard: bool = False  # extra: tensorboard
     wandb: str | None = None  # project on Weights & Biases, extra: wandb; None: off
     init_from: str | None = None  # a checkpoint whose policy starts the run
-    # another one, which knows irregular ground and teaches there, where init_from knows a plane alone
+    # another one, of irregular ground: it teaches there what init_from, of a plane, does not know
     irregular_from: str | None = None
     # also its critic, optimiser, curriculum and which starts are learned: the same task goes on
     # with another number of simulations or on another engine; `ppo.critic_first` is not needed

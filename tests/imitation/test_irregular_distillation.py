@@ -1,0 +1,114 @@
+"""Two policies, one of the plane and one of irregular ground, teach a third one."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import jax
+import numpy as np
+import pytest
+from ground_samples import TERRAIN
+from tiny_task import CONFIG, getups, neutral_prior
+
+from compiled import first_policy
+from eval_samples import SMALL, make_task, save_policy
+from getup_jax.config import Config, ConfigError, NetworkConfig, PPOConfig, TrainConfig
+from getup_jax.envs.getup.build import assemble
+from getup_jax.envs.getup.resets import region_pool
+from getup_jax.imitation import action_regression, irregular_distillation
+from getup_jax.imitation.action_distillation import Teacher
+from getup_jax.imitation.irregular_distillation import distill_on_irregular
+from getup_jax.physics.character import load_character
+from getup_jax.rl.learner import make_learner
+from getup_jax.runtime.checkpoint import load_policy
+from getup_jax.training.run import _knows_irregular_ground
+
+PPO = PPOConfig(num_envs=16, num_steps=8, minibatch_size=64)
+TASK = dataclasses.replace(CONFIG.task, pool_size=96, stand_start=0.5)
+KEY = jax.random.PRNGKey(0)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(region_pool, "cache_dir", lambda: tmp_path_factory.mktemp("starts"))
+        character = load_character(CONFIG.physics)
+        terrain = dataclasses.replace(TERRAIN, curriculum="none")
+        config = dataclasses.replace(CONFIG, task=TASK, terrain=terrain)
+        prior = neutral_prior(character)
+        task = assemble(config, character, getups(character), prior, lambda text: None)
+    return task, make_learner(task.environment, NetworkConfig((64,)), PPO, total_steps=1000)
+
+
+@pytest.fixture(scope="module")
+def teacher(built):
+    task, learner = built
+    env = task.environment
+    policy = first_policy(learner, seed=1)
+    return Teacher(
+        learner.model, policy, env.decoder(task.world), env.observer, env.config.lookahead_s
+    )
+
+
+def test_each_of_the_two_says_what_to_do_on_the_ground_that_it_knows(built, teacher):
+    task, learner = built
+    env, policy = task.environment, first_policy(learner)
+    state = jax.jit(env.init, static_argnums=2)(task.world, KEY, 64)
+    demos = irregular_distillation._demonstrate(
+        learner, task.world, policy, teacher, state.observation
+    )
+    block = env.observer.slices()["height_map"]
+    even = np.ptp(np.asarray(state.observation)[:, block], axis=1) < 1e-4
+    assert 4 < even.sum() < 60
+    condition, decoder = env.observer.condition(state.observation), env.decoder(task.world)
+    own = learner.act(policy, env.observer.evened(state.observation))
+    np.testing.assert_allclose(demos.action[even], own[even], atol=1e-5)
+    other = decoder.target(learner.act(teacher.policy, state.observation), condition)
+    # the last action that it sees has the same target, but by the latent that this is encoded by
+    np.testing.assert_allclose(demos.target[~even], other[~even], atol=0.02)
+    np.testing.assert_allclose(demos.target, decoder.target(demos.action, condition), atol=1e-4)
+
+
+@pytest.mark.slow
+def test_the_policy_learns_from_the_two(built, teacher, monkeypatch):
+    monkeypatch.setattr(action_regression, "_MINIBATCH", 64)
+    monkeypatch.setattr(irregular_distillation, "_SAMPLES", 1280)
+    monkeypatch.setattr(irregular_distillation, "_ROUNDS", 2)
+    task, learner = built
+    log: list[str] = []
+    distill_on_irregular(learner, task.world, first_policy(learner), teacher, KEY, log.append)
+    first, last = ([float(x) for x in re.findall(r"[0-9]+\.[0-9]+", line)] for line in log[1:])
+    assert last[0] < 0.8 * first[1]  # degrees on irregular ground, at the end and at the start
+    assert last[2] < last[0]  # on the plane, where it began with the right weights
+
+
+@pytest.mark.parametrize(
+    ("train", "terrain", "message"),
+    [
+        ({"irregular_from": "b"}, True, r"train\.irregular_from: expected train\.init_from, of a"),
+        (
+            {"irregular_from": "b", "init_from": "a", "init_learner": True},
+            True,
+            r"no train\.init_learner, got 'b'",
+        ),
+        ({"irregular_from": "b", "init_from": "a"}, False, r"expected null on a flat plane"),
+    ],
+)
+def test_settings_that_do_not_go_together_are_refused(train, terrain, message):
+    with pytest.raises(ConfigError, match=message):
+        Config(train=TrainConfig(**train), terrain=TERRAIN if terrain else None)
+
+
+def test_a_second_policy_of_the_plane_is_refused(tmp_path):
+    task = make_task(SMALL)
+    folder = save_policy(tmp_path / "plane", task)
+    start = load_policy(folder)
+    config = dataclasses.replace(
+        SMALL,
+        terrain=TERRAIN,
+        train=TrainConfig(init_from=str(folder), irregular_from=str(folder)),
+    )
+    message = r"train\.irregular_from: expected a policy of irregular ground, got .*plane"
+    with pytest.raises(ConfigError, match=message):
+        _knows_irregular_ground(config, start)
