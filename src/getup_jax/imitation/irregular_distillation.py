@@ -23,9 +23,10 @@ from getup_jax.imitation.action_regression import Demonstrations, Log
 from getup_jax.rl.learner import Learner
 from getup_jax.rl.state import PolicyState
 
-_ROUNDS = 3
+_ROUNDS = 10
 _SAMPLES = 150_000  # at least, of each round, and of the plane alone; the last rollout is held out
-_EPOCHS = 10  # of a round; of the last one, as many as any regression has
+_WINDOW = 3  # rounds whose samples are learned from, beside those of the plane
+_EPOCHS, _LAST_EPOCHS = 2, 8  # of a round, and of the last one: new states teach more than old ones
 _EVEN_M = 1e-3  # differences within the height map, which rounding makes, too
 _FLAT_ONLY = {"curriculum": "success", "unlock_successes": 10**9}  # nothing else opens
 _ALL_OPEN = {"curriculum": "none"}
@@ -65,15 +66,16 @@ def distill_on_irregular(
     key_plane, *keys = jax.random.split(key, 1 + _ROUNDS)
     flat = collect(plane, world, as_taught, demonstrate, rollouts, key_plane)
     flat, flat_heldout = action_regression.split(flat, len(flat.observation) // rollouts)
-    seen, act, decoder = [flat], as_taught, env.decoder(world)
+    act, decoder = as_taught, env.decoder(world)
+    seen: list[Demonstrations] = []
     for number, key_round in enumerate(keys, start=1):
         key_roll, key_order = jax.random.split(key_round)
         part = collect(anywhere, world, act, demonstrate, rollouts, key_roll)
         training, heldout = action_regression.split(part, len(part.observation) // rollouts)
-        seen.append(training)
+        seen = [*seen[1 - _WINDOW :], training]
         before, _ = action_regression.compare(learner, policy, decoder, heldout)
-        demos = action_regression.join(seen)
-        epochs = None if number == _ROUNDS else _EPOCHS
+        demos = action_regression.join([flat, *seen])
+        epochs = _LAST_EPOCHS if number == _ROUNDS else _EPOCHS
         policy = action_regression.clone(learner, policy, decoder, demos, key_order, epochs)
         after, _ = action_regression.compare(learner, policy, decoder, heldout)
         on_plane, _ = action_regression.compare(learner, policy, decoder, flat_heldout)
