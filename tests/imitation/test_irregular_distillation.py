@@ -6,6 +6,7 @@ import dataclasses
 import re
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from ground_samples import TERRAIN
@@ -70,11 +71,29 @@ def test_each_of_the_two_says_what_to_do_on_the_ground_that_it_knows(built, teac
     np.testing.assert_allclose(demos.target, decoder.target(demos.action, condition), atol=1e-4)
 
 
+def test_only_bodies_near_their_curves_are_learned_from(built, teacher):
+    task, learner = built
+    env = task.environment
+    state = jax.jit(env.init, static_argnums=2)(task.world, KEY, 32)
+    start = jax.jit(env.start)(task.world, state.getup, state.kind, state.getup * 0)
+    observation = start.observation
+    demos = irregular_distillation._demonstrate(
+        learner, task.world, first_policy(learner), teacher, observation
+    )
+    features = env.observer.slices()["features"]
+    far = observation.at[:20, features].add(jnp.asarray([0.0, 0.0, 1.5]))  # e^-2.25 = .1 less
+    left = irregular_distillation._that_follow(env, demos.replace(observation=far))
+    np.testing.assert_array_equal(left.observation, far[20:])
+    np.testing.assert_array_equal(left.target, demos.target[20:])
+
+
 @pytest.mark.slow
 def test_the_policy_learns_from_the_two(built, teacher, monkeypatch):
     monkeypatch.setattr(action_regression, "_MINIBATCH", 64)
     monkeypatch.setattr(irregular_distillation, "_SAMPLES", 1280)
     monkeypatch.setattr(irregular_distillation, "_ROUNDS", 2)
+    monkeypatch.setattr(irregular_distillation, "_EPOCHS", 20)
+    monkeypatch.setattr(irregular_distillation, "_LAST_EPOCHS", 40)
     task, learner = built
     log: list[str] = []
     distill_on_irregular(learner, task.world, first_policy(learner), teacher, KEY, log.append)

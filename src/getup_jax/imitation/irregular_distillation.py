@@ -15,7 +15,9 @@ import math
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
+from getup_jax.envs.getup import rewards
 from getup_jax.envs.getup.task import GetUpTask, World
 from getup_jax.imitation import action_regression
 from getup_jax.imitation.action_distillation import Teacher
@@ -27,6 +29,7 @@ _ROUNDS = 10
 _SAMPLES = 150_000  # at least, of each round, and of the plane alone; the last rollout is held out
 _WINDOW = 3  # rounds whose samples are learned from, beside those of the plane
 _EPOCHS, _LAST_EPOCHS = 2, 8  # of a round, and of the last one: new states teach more than old ones
+_FOLLOWS = 0.3  # r_h r_theta; further off, no teacher knows what to do, and all are told otherwise
 _EVEN_M = 1e-3  # differences within the height map, which rounding makes, too
 _FLAT_ONLY = {"curriculum": "success", "unlock_successes": 10**9}  # nothing else opens
 _ALL_OPEN = {"curriculum": "none"}
@@ -56,7 +59,7 @@ def distill_on_irregular(
     log("it has trained on a plane: distilling what the other one does on irregular ground ...")
     demonstrate = functools.partial(_demonstrate, learner, world, policy, teacher)
     plane = env.with_terrain(dataclasses.replace(env.terrain, **_FLAT_ONLY))
-    anywhere = env.with_terrain(dataclasses.replace(env.terrain, **_ALL_OPEN))
+    anywhere = _on_library_curves(env.with_terrain(dataclasses.replace(env.terrain, **_ALL_OPEN)))
     rollouts = 1 + math.ceil(_SAMPLES / (learner.config.num_envs * learner.config.num_steps))
     collect = functools.partial(action_regression.collect, learner)
 
@@ -71,7 +74,8 @@ def distill_on_irregular(
     for number, key_round in enumerate(keys, start=1):
         key_roll, key_order = jax.random.split(key_round)
         part = collect(anywhere, world, act, demonstrate, rollouts, key_roll)
-        training, heldout = action_regression.split(part, len(part.observation) // rollouts)
+        parts = action_regression.split(part, len(part.observation) // rollouts)
+        training, heldout = (_that_follow(env, demos) for demos in parts)
         seen = [*seen[1 - _WINDOW :], training]
         before, _ = action_regression.compare(learner, policy, decoder, heldout)
         demos = action_regression.join([flat, *seen])
@@ -85,6 +89,21 @@ def distill_on_irregular(
         )
         act = functools.partial(learner.act, policy)
     return policy
+
+
+def _on_library_curves(env: GetUpTask) -> GetUpTask:
+    """The task without drawn curves, which the policies of irregular ground have not seen."""
+    config = dataclasses.replace(env.curriculum.config, drawn_curves=0.0)
+    return dataclasses.replace(env, curriculum=dataclasses.replace(env.curriculum, config=config))
+
+
+def _that_follow(env: GetUpTask, demos: Demonstrations) -> Demonstrations:
+    """Those of bodies that are near their curves."""
+    value = demos.observation[:, env.observer.slices()["features"]]
+    near_height = rewards.height(value[:, 0], demos.condition[:, 0])
+    near_angles = rewards.orientation(value[:, 1:], demos.condition[:, 1:])
+    near = np.asarray(near_height * near_angles > _FOLLOWS)
+    return jax.tree.map(lambda x: x[near], demos)
 
 
 def _demonstrate(
