@@ -110,6 +110,8 @@ def test_numbers_that_yaml_takes_for_text_convert_in_files_too(write):
         ),
         ("ppo.epochs", "'ppo.epochs': expected section.key=value"),
         ("ppo.=1", "'ppo.=1': expected section.key=value"),
+        (["ppo.epochs=4"], "overrides: expected texts, each of section.key=value, got ['ppo.ep"),
+        ({"ppo.epochs": 4}, "overrides: expected texts, each of section.key=value, got {'ppo.ep"),
         ("ppo.epochs=[1", "ppo.epochs: broken YAML in '[1'"),
     ],
 )

@@ -47,6 +47,8 @@ def teacher(built):
     task, learner = built
     env = task.environment
     policy = first_policy(learner, seed=1)
+    # a fresh actor hardly moves; this one does
+    policy = dataclasses.replace(policy, actor=jax.tree.map(lambda x: 4.0 * x, policy.actor))
     return Teacher(
         learner.model, policy, env.decoder(task.world), env.observer, env.config.lookahead_s
     )
@@ -65,9 +67,9 @@ def test_each_of_the_two_says_what_to_do_on_the_ground_that_it_knows(built, teac
     condition, decoder = env.observer.condition(state.observation), env.decoder(task.world)
     own = learner.act(policy, env.observer.evened(state.observation))
     np.testing.assert_allclose(demos.action[even], own[even], atol=1e-5)
-    other = decoder.target(learner.act(teacher.policy, state.observation), condition)
-    # the last action that it sees has the same target, but by the latent that this is encoded by
-    np.testing.assert_allclose(demos.target[~even], other[~even], atol=0.02)
+    other = teacher.demonstrate(env, decoder, state.observation)
+    np.testing.assert_allclose(demos.target[~even], other.target[~even], atol=1e-4)
+    assert np.abs(demos.target - decoder.target(own, condition))[~even].max() > 0.05
     np.testing.assert_allclose(demos.target, decoder.target(demos.action, condition), atol=1e-4)
 
 
@@ -92,14 +94,15 @@ def test_the_policy_learns_from_the_two(built, teacher, monkeypatch):
     monkeypatch.setattr(action_regression, "_MINIBATCH", 64)
     monkeypatch.setattr(irregular_distillation, "_SAMPLES", 1280)
     monkeypatch.setattr(irregular_distillation, "_ROUNDS", 2)
-    monkeypatch.setattr(irregular_distillation, "_EPOCHS", 20)
-    monkeypatch.setattr(irregular_distillation, "_LAST_EPOCHS", 40)
+    monkeypatch.setattr(irregular_distillation, "_EPOCHS", 30)
+    monkeypatch.setattr(irregular_distillation, "_LAST_EPOCHS", 30)
     task, learner = built
     log: list[str] = []
     distill_on_irregular(learner, task.world, first_policy(learner), teacher, KEY, log.append)
-    first, last = ([float(x) for x in re.findall(r"[0-9]+\.[0-9]+", line)] for line in log[1:])
-    assert last[0] < 0.8 * first[1]  # degrees on irregular ground, at the end and at the start
-    assert last[2] < last[0]  # on the plane, where it began with the right weights
+    rounds = [[float(x) for x in re.findall(r"[0-9]+\.[0-9]+", line)] for line in log[1:]]
+    for after, before, on_plane in rounds:  # degrees; in states that were held out
+        assert after < 0.95 * before
+        assert on_plane < after  # where it began with the right weights
 
 
 @pytest.mark.parametrize(

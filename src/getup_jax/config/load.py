@@ -123,6 +123,10 @@ def _read_with_base(file: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
 
 def _parse_override(override: str) -> dict[str, Any]:
     """`a.b=value` as {a: {b: value}}."""
+    if not isinstance(override, str):  # from Python, where a list is easily one too many
+        raise ConfigError(
+            f"overrides: expected texts, each of section.key=value, got {describe(override)}"
+        )
     key, equals, text = override.partition("=")
     first, *inner = names = key.strip().split(".")
     if not equals or not all(names) or len(names) > _DEEPEST:
