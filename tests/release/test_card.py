@@ -8,7 +8,7 @@ import pytest
 
 from getup_jax.config import ConfigError
 from getup_jax.core.resources import asset_path
-from getup_jax.release.card import gain_line, weak_curves
+from getup_jax.release.card import _conditions, gain_line, weak_curves
 from getup_jax.release.export import CARD, export
 from getup_jax.runtime.checkpoint import load_policy
 
@@ -80,6 +80,9 @@ def test_a_curve_that_fails_is_named_once_with_its_worst_evaluation():
     )
     assert many[0].count("%)") == 8
     assert weak_curves([evaluated(a=0.8)]) == []
+    others = evaluated(a=0.1)  # motions that it was not trained on are not its limits
+    others["conditions"]["motions"] = "recorded.yaml"
+    assert weak_curves([others]) == []
 
 
 def test_a_card_says_what_is_done_of_edits_and_which_curves_were_trained(tmp_path):
@@ -95,3 +98,35 @@ def test_a_card_says_what_is_done_of_edits_and_which_curves_were_trained(tmp_pat
     for name, expected in (("getup", "curves drawn around"), ("flat", "the curves of its styles")):
         card = (export(asset_path("checkpoints", name), tmp_path / name) / CARD).read_text()
         assert f"Trained on {expected}" in card
+
+
+def test_a_card_says_on_which_motions_curves_and_ground_a_policy_was_tried():
+    plain = {
+        "start": "lying",
+        "seed": 0,
+        "engine": "native",
+        "start_noise_rad": 0.0,
+        "duration_scale": [1.0, 1.0],
+        "blend": None,
+        "push_ns": None,
+        "stand_time_s": 3.0,
+    }
+    other = {
+        "motions": "there/recorded.yaml",
+        "curves": ["here/a.json", "b.json"],
+        "early_termination": False,
+        "ground": {"heights": "far/hills.png", "region_size_m": 24.0, "height_m": 2.0},
+    }
+    own = _conditions(plain)
+    assert "motions" not in own
+    assert "curves" not in own
+    assert "early" not in own
+    said = _conditions(plain | other)
+    for part in (
+        "motions of recorded.yaml",
+        "curves of a.json, b.json",
+        "no early ends",
+        "ground of hills.png",
+    ):
+        assert part in said
+    assert "there/" not in said

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from getup_jax.release import composite_card
@@ -155,6 +156,12 @@ def _conditions(of: Mapping[str, Any]) -> str:
     low, high = of["duration_scale"]
     parts = [f"{of['start'].capitalize()} starts", f"seed {of['seed']}", f"engine {of['engine']}"]
     parts += [f"joint noise {of['start_noise_rad']:g} rad", f"durations T x U({low:g}, {high:g})"]
+    if of.get("motions") is not None:
+        parts.append(f"motions of {Path(of['motions']).name}")
+    if of.get("curves"):
+        parts.append(f"curves of {', '.join(Path(file).name for file in of['curves'])}")
+    if of.get("ground") is not None:
+        parts.append(f"ground of {Path(of['ground']['heights']).name}")
     if of.get("terrain_seed") is not None:
         parts.append(f"ground of seed {of['terrain_seed']}")
     if of.get("drops") is not None:
@@ -163,6 +170,8 @@ def _conditions(of: Mapping[str, Any]) -> str:
         parts.append(f"mixtures of two curves ({of['blend']})")
     if of["push_ns"] is not None:
         parts.append(f"pushes of {of['push_ns']:g} Ns")
+    if not of.get("early_termination", True):
+        parts.append("no early ends")
     return f"{', '.join(parts)}; {of['stand_time_s']:g} s of standing:"
 
 
@@ -186,7 +195,9 @@ def weak_curves(evaluations: Sequence[Mapping[str, Any]]) -> list[str]:
     """A line on the curves that often fail, each with its worst evaluation; or none."""
     worst: dict[str, float] = {}
     for result in evaluations:
-        if result["conditions"]["start"] == "lying" and result["conditions"]["blend"] is None:
+        of = result["conditions"]
+        own = of["blend"] is None and of.get("motions") is None and not of.get("curves")
+        if of["start"] == "lying" and own:  # the curves that it was trained on
             for name, part in (result.get("per_curve") or {}).items():
                 worst[name] = min(part["success"], worst.get(name, 1.0))
     weak = sorted(((rate, name) for name, rate in worst.items() if rate < LOW_SUCCESS))
