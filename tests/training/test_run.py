@@ -277,6 +277,8 @@ def test_another_body_than_that_of_the_policy_to_begin_with_is_said_before_build
     assert "was trained on a body with other servos; " in line
     with pytest.raises(CheckpointError, match="none: no such folder"):
         run(settings(1, f"train.init_from={tmp_path}/none"), tmp_path / "no", build=unbuilt)
+    with pytest.raises(ConfigError, match=r"train\.init_from: expected a policy of getting up"):
+        run(settings(1, "train.init_from=walk"), tmp_path / "no", build=unbuilt)
 
 
 # --- the run folder

@@ -197,6 +197,9 @@ def _policy_to_begin_with(config: Config, log: Log) -> LoadedPolicy | None:
     if config.train.init_from is None:
         return None
     start = checkpoint.load_policy(config.train.init_from)
+    motion = "composite motion" if config.composite_motion else "getting up"
+    same = start.config.composite_motion == config.composite_motion
+    require(same, "train.init_from", f"a policy of {motion}", config.train.init_from)
     if config.train.irregular_from is not None:
         _knows_irregular_ground(config, start)
     held = None if composite is None else equipment_of(composite.goals)
