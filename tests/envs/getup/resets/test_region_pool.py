@@ -31,13 +31,14 @@ def cache(tmp_path_factory):
     return tmp_path_factory.mktemp("starts")
 
 
-def uneven_task(character, cache, config=SETTINGS):
+def uneven_task(character, cache, config=SETTINGS, of=None):
     """A get-up task on the small irregular ground."""
     config = dataclasses.replace(config, terrain=TERRAIN)
     with pytest.MonkeyPatch.context() as patch:
         for module in (region_pool, limp):
             patch.setattr(module, "cache_dir", lambda: cache)
-        return assemble(config, character, getups(character), neutral_prior(character), print)
+        styles = getups(character) if of is None else of
+        return assemble(config, character, styles, neutral_prior(character), print)
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +66,22 @@ def test_starts_lie_in_their_region_and_on_the_ground(uneven, site, region):
         gap = deepest_contact(site.character, qpos)
         assert gap.min() > -0.02
         assert gap.max() < 0.01
+
+
+def test_motions_recorded_far_from_the_origin_start_in_the_flat_region_too(character, cache, site):
+    def moved(getup):
+        if getup.clip is None:
+            return getup
+        qpos = getup.clip.qpos + np.eye(7 + 49)[0] * 50.0  # m, of the root
+        return dataclasses.replace(getup, clip=dataclasses.replace(getup.clip, qpos=qpos))
+
+    far = [moved(getup) for getup in getups(character)]
+    assert any(getup.clip is not None for getup in far)
+    built = uneven_task(character, cache, of=far)
+    for kind in (LYING, CLIP):
+        for style in range(2):
+            xy = rows(built, kind, 0, style)[:, :2]
+            np.testing.assert_array_equal(site.ground.region(xy), 0)
 
 
 def test_lying_starts_fit_their_curve(uneven, site):

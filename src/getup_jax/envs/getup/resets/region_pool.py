@@ -160,7 +160,7 @@ def _on_the_flat(
 ) -> FreeStarts:
     """The flat region's starts, the first in the pool; their rows are written into the table."""
     starts, table[:, 0] = flat.make(table.shape[-1])
-    starts.qpos[:, :2] += site.ground.draw_spawn(0, len(starts), rng)
+    starts.qpos[:, :2] = site.ground.draw_spawn(0, len(starts), rng)  # recordings are far from 0
     flat.lay_down(starts, table[LYING, 0], site.character, log)
     return starts
 
