@@ -10,36 +10,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from ground_samples import TERRAIN
-from tiny_task import CONFIG, getups, neutral_prior
 
 from compiled import first_policy
 from eval_samples import SMALL, make_task, save_policy
-from getup_jax.config import Config, ConfigError, NetworkConfig, PPOConfig, TrainConfig
-from getup_jax.envs.getup.build import assemble
-from getup_jax.envs.getup.resets import region_pool
+from getup_jax.config import Config, ConfigError, TrainConfig
 from getup_jax.imitation import action_regression, irregular_distillation
 from getup_jax.imitation.action_distillation import Teacher
 from getup_jax.imitation.irregular_distillation import distill_on_irregular
-from getup_jax.physics.character import load_character
-from getup_jax.rl.learner import make_learner
 from getup_jax.runtime.checkpoint import load_policy
 from getup_jax.training.run import _knows_irregular_ground
 
-PPO = PPOConfig(num_envs=16, num_steps=8, minibatch_size=64)
-TASK = dataclasses.replace(CONFIG.task, pool_size=96, stand_start=0.5)
 KEY = jax.random.PRNGKey(0)
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(region_pool, "cache_dir", lambda: tmp_path_factory.mktemp("starts"))
-        character = load_character(CONFIG.physics)
-        terrain = dataclasses.replace(TERRAIN, curriculum="none")
-        config = dataclasses.replace(CONFIG, task=TASK, terrain=terrain)
-        prior = neutral_prior(character)
-        task = assemble(config, character, getups(character), prior, lambda text: None)
-    return task, make_learner(task.environment, NetworkConfig((64,)), PPO, total_steps=1000)
 
 
 @pytest.fixture(scope="module")

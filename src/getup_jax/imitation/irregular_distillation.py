@@ -22,6 +22,7 @@ from getup_jax.envs.getup.task import GetUpTask, World
 from getup_jax.imitation import action_regression
 from getup_jax.imitation.action_distillation import Teacher
 from getup_jax.imitation.action_regression import Demonstrations, Log
+from getup_jax.imitation.slope_warm_start import as_if_even, everywhere, on_the_flat
 from getup_jax.rl.learner import Learner
 from getup_jax.rl.state import PolicyState
 
@@ -31,8 +32,6 @@ _WINDOW = 3  # rounds whose samples are learned from, beside those of the plane
 _EPOCHS, _LAST_EPOCHS = 2, 8  # of a round, and of the last one: new states teach more than old ones
 _FOLLOWS = 0.3  # r_h r_theta; further off, no teacher knows what to do, and all are told otherwise
 _EVEN_M = 1e-3  # differences within the height map, which rounding makes, too
-_FLAT_ONLY = {"curriculum": "success", "unlock_successes": 10**9}  # nothing else opens
-_ALL_OPEN = {"curriculum": "none"}
 
 
 def distill_on_irregular(
@@ -55,11 +54,9 @@ def distill_on_irregular(
     """
     env = learner.env
     assert isinstance(env, GetUpTask)
-    assert env.terrain is not None
     log("it has trained on a plane: distilling what the other one does on irregular ground ...")
     demonstrate = functools.partial(_demonstrate, learner, world, policy, teacher)
-    plane = env.with_terrain(dataclasses.replace(env.terrain, **_FLAT_ONLY))
-    anywhere = _on_library_curves(env.with_terrain(dataclasses.replace(env.terrain, **_ALL_OPEN)))
+    plane, anywhere = on_the_flat(env), _on_library_curves(everywhere(env))
     rollouts = 1 + math.ceil(_SAMPLES / (learner.config.num_envs * learner.config.num_steps))
     collect = functools.partial(action_regression.collect, learner)
 
@@ -112,12 +109,8 @@ def _demonstrate(
     """What the two would do, each on its ground, for raw observations [N, O] of the new run."""
     env = learner.env
     assert isinstance(env, GetUpTask)
-    decoder, observer = env.decoder(world), env.observer
-    even = observer.evened(observation)
-    condition = observer.condition(observation)
-    action = learner.act(own, even)
-    target = decoder.target(action, condition)
-    here = Demonstrations(observation, action, target, condition)
-    there = teacher.demonstrate(env, decoder, observation)
-    irregular = jnp.any(jnp.abs(even - observation) > _EVEN_M, axis=-1)
+    here = as_if_even(learner, world, own, observation)
+    there = teacher.demonstrate(env, env.decoder(world), observation)
+    bumps = jnp.abs(env.observer.evened(observation) - observation)
+    irregular = jnp.any(bumps > _EVEN_M, axis=-1)
     return jax.tree.map(lambda a, b: jnp.where(irregular[:, None], a, b), there, here)

@@ -45,20 +45,13 @@ def warm_start_on_slopes(
     """The policy with an actor that turns its feet to the slope where it stands."""
     env = learner.env
     assert isinstance(env, GetUpTask)
-    assert env.terrain is not None
     decoder = env.decoder(world)
     log("it has trained on a plane: teaching it to stand on slopes ...")
     keys = jax.random.split(key, _HELD + 3)
-
-    def as_it_is(observation: jax.Array) -> Demonstrations:
-        condition = env.observer.condition(observation)
-        action = learner.act(policy, env.observer.evened(observation))
-        return Demonstrations(observation, action, decoder.target(action, condition), condition)
-
-    plane = env.with_terrain(dataclasses.replace(env.terrain, **_FLAT_ONLY))
+    as_it_is = functools.partial(as_if_even, learner, world, policy)
     act = functools.partial(learner.act, policy)
-    own = action_regression.collect(learner, plane, world, act, as_it_is, _OWN, keys[0])
-    anywhere = env.with_terrain(dataclasses.replace(env.terrain, **_ALL_OPEN))
+    own = action_regression.collect(learner, on_the_flat(env), world, act, as_it_is, _OWN, keys[0])
+    anywhere = everywhere(env)
     stretched = _stretched(env)
 
     def head_up(observation: jax.Array) -> Demonstrations:
@@ -80,6 +73,30 @@ def warm_start_on_slopes(
         "slopes"
     )
     return policy
+
+
+def on_the_flat(env: GetUpTask) -> GetUpTask:
+    """The task on irregular ground, of which the flat region alone is open."""
+    assert env.terrain is not None
+    return env.with_terrain(dataclasses.replace(env.terrain, **_FLAT_ONLY))
+
+
+def everywhere(env: GetUpTask) -> GetUpTask:
+    """The task on irregular ground with all regions open."""
+    assert env.terrain is not None
+    return env.with_terrain(dataclasses.replace(env.terrain, **_ALL_OPEN))
+
+
+def as_if_even(
+    learner: Learner, world: World, policy: PolicyState, observation: jax.Array
+) -> Demonstrations:
+    """What the policy would do if the map were even, for raw observations [N, O]."""
+    env = learner.env
+    assert isinstance(env, GetUpTask)
+    condition = env.observer.condition(observation)
+    action = learner.act(policy, env.observer.evened(observation))
+    target = env.decoder(world).target(action, condition)
+    return Demonstrations(observation, action, target, condition)
 
 
 def _stretched(env: GetUpTask) -> Callable[[jax.Array, jax.Array], jax.Array]:

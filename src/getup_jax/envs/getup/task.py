@@ -155,7 +155,7 @@ class GetUpTask:
         size = len(getup)
         own = style_curve(world, getup)
         curve = own if curve is None else curve
-        features = self.observer.posture(physics.kinematics, world.terrain).features
+        posture = self.observer.posture(physics.kinematics, world.terrain)
         state = EpisodeState(
             physics=physics,
             observation=jnp.zeros((size, self.observation_size), jnp.float32),
@@ -163,7 +163,7 @@ class GetUpTask:
             getup=getup,
             kind=kind,
             time=world.pool.time[index] * (curve.duration / own.duration),
-            points=curve.from_pose(features),
+            points=curve.from_pose(posture.features),
             duration=curve.duration,
             low_steps=jnp.zeros(size, jnp.int32),
             head_steps=jnp.zeros(size, jnp.int32),
@@ -176,7 +176,7 @@ class GetUpTask:
         given = None if world.pool.action is None else world.pool.action[index]
         action, unasked = self.decoder(world).begin(angles, condition, given)
         state = state.replace(action=action, start_offset=unasked)
-        return state.replace(observation=self._observe(state, self._posture(world, state)))
+        return state.replace(observation=self._observe(state, posture))
 
     def advance(
         self, world: World, state: EpisodeState, action: jax.Array
