@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from getup_jax.core.mirror import CURVE, POLAR, QUATERNION, concatenated, signed, vectors
-from getup_jax.networks.equivariant import EquivariantMLP, joined, parts, sizes
+from getup_jax.networks.equivariant import EquivariantMLP, dense, joined, parts, sizes
+from getup_jax.networks.mlp import MLP
 
 SEEN = concatenated([vectors([1, 0], signed(POLAR)), CURVE, signed(QUATERNION)])
 DONE = concatenated([vectors([1, 0, 2], signed([1.0, -1.0])), signed([1.0])])
@@ -76,3 +77,14 @@ def test_the_kernels_are_half_of_a_dense_networks():
     evens, odds = sizes(DONE)
     assert evens + odds == DONE.size
     assert kernels == 16 * SEEN.size + 2 * 16 * 16 // 2 + 8 * DONE.size
+
+
+@pytest.mark.parametrize("hidden", [(), (32, 16)])
+@pytest.mark.parametrize("image", [DONE, signed([1.0, 1.0])])
+def test_a_dense_network_can_do_the_same(hidden, image):
+    net, variables = make(hidden, image)
+    mlp = MLP(hidden, image.size, "elu")
+    expanded = dense(net, variables)
+    shapes = jax.tree.map(np.shape, mlp.init(jax.random.PRNGKey(1), X[0]))
+    assert jax.tree.map(np.shape, expanded) == shapes
+    np.testing.assert_allclose(mlp.apply(expanded, X), net.apply(variables, X), atol=2e-5)

@@ -27,6 +27,7 @@ from getup_jax.envs.getup.symmetry import find_symmetry
 from getup_jax.envs.getup.task import GetUpTask, World
 from getup_jax.imitation import action_regression
 from getup_jax.imitation.action_regression import Demonstrations
+from getup_jax.networks.equivariant import EquivariantMLP, dense
 from getup_jax.pose_prior import prior as pose_prior
 from getup_jax.pose_prior.prior import PosePrior
 from getup_jax.rl import normalize
@@ -73,16 +74,23 @@ class Teacher:
             condition=condition,
         )
 
-    def fits(self, learner: Learner) -> bool:
-        """Whether its weights can be used there; what an action means may still differ."""
-        env, model = learner.env, learner.model
-        return (
-            self.lookahead_s == env.config.lookahead_s
-            and self.observer.table == env.observer.table
-            and (self.model.symmetry is None) == (model.symmetry is None)
-            and (self.model.actor.hidden_sizes, self.model.actor.activation)
-            == (model.actor.hidden_sizes, model.actor.activation)
-        )
+    def weights_for(self, learner: Learner) -> PolicyState | None:
+        """Its policy for the networks there, None where they need others.
+
+        What an action means may still differ.
+        """
+        env, own, there = learner.env, self.model.actor, learner.model.actor
+        if (
+            self.lookahead_s != env.config.lookahead_s
+            or self.observer.table != env.observer.table
+            or (own.hidden_sizes, own.activation) != (there.hidden_sizes, there.activation)
+        ):
+            return None
+        if (self.model.symmetry is None) == (learner.model.symmetry is None):
+            return self.policy
+        if not isinstance(own, EquivariantMLP) or any(size % 2 for size in own.hidden_sizes):
+            return None
+        return dataclasses.replace(self.policy, actor=dense(own, self.policy.actor))
 
 
 def make_teacher(
@@ -189,16 +197,17 @@ def carry_over(
         key: of the starts, the noise and the order of the minibatches.
         log: gets a line for each round.
 
-    Returns the teacher's own policy where its weights mean the same here.
+    Returns the teacher's own policy where its weights mean the same here; networks that are not
+    mirror-equivariant begin with weights that are, if the teacher's were.
     """
     env = learner.env
     assert isinstance(env, GetUpTask)
-    decoder, fits = env.decoder(world), teacher.fits(learner)
-    if fits and teacher.decoder.same(decoder):
-        return teacher.policy
+    decoder, begun = env.decoder(world), teacher.weights_for(learner)
+    if begun is not None and teacher.decoder.same(decoder):
+        return begun
     log("its networks, observation, prior or offsets are others: distilling it into this run's ...")
     demonstrate = functools.partial(teacher.demonstrate, env, decoder)
-    policy, seen = teacher.policy if fits else own, []
+    policy, seen = own if begun is None else begun, []
 
     def act(observation: jax.Array) -> jax.Array:
         return demonstrate(observation).action

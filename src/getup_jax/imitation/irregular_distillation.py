@@ -4,14 +4,17 @@ To learn slopes from a policy that knows only the plane takes tens of millions o
 another policy has made them, they need not be made again: each of the two teaches the new one on
 the ground that it knows (policy distillation from several teachers, Rusu et al. 2016), in the
 states that the new one gets to itself (DAgger, Ross et al. 2011). It begins with the weights of the
-first, as if the map were even.
+first, as if the map were even. Networks that are mirror-equivariant cannot follow a teacher that is
+not: what it does left and right, they would do half of at once.
 """
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 import functools
 import math
+import time
 
 import jax
 import jax.numpy as jnp
@@ -21,15 +24,16 @@ from getup_jax.envs.getup import rewards
 from getup_jax.envs.getup.task import GetUpTask, World
 from getup_jax.imitation import action_regression
 from getup_jax.imitation.action_distillation import Teacher
-from getup_jax.imitation.action_regression import Demonstrations, Log
+from getup_jax.imitation.action_regression import Cloning, Collector, Demonstrations, Log
 from getup_jax.imitation.slope_warm_start import as_if_even, everywhere, on_the_flat
 from getup_jax.rl.learner import Learner
 from getup_jax.rl.state import PolicyState
+from getup_jax.runtime.console import duration
 
-_ROUNDS = 10
-_SAMPLES = 150_000  # at least, of each round, and of the plane alone; the last rollout is held out
-_WINDOW = 3  # rounds whose samples are learned from, beside those of the plane
-_EPOCHS, _LAST_EPOCHS = 2, 8  # of a round, and of the last one: new states teach more than old ones
+_ROUNDS = 40
+_SAMPLES, _ON_PLANE = 90_000, 30_000  # of a round, at least: anywhere, and of the plane alone
+_KEPT = 9  # rounds whose samples are learned from
+_UPDATES = 500  # of a round
 _FOLLOWS = 0.3  # r_h r_theta; further off, no teacher knows what to do, and all are told otherwise
 _EVEN_M = 1e-3  # differences within the height map, which rounding makes, too
 
@@ -55,37 +59,45 @@ def distill_on_irregular(
     env = learner.env
     assert isinstance(env, GetUpTask)
     log("it has trained on a plane: distilling what the other one does on irregular ground ...")
-    demonstrate = functools.partial(_demonstrate, learner, world, policy, teacher)
-    plane, anywhere = on_the_flat(env), _on_library_curves(everywhere(env))
-    rollouts = 1 + math.ceil(_SAMPLES / (learner.config.num_envs * learner.config.num_steps))
-    collect = functools.partial(action_regression.collect, learner)
-
-    def as_taught(observation: jax.Array) -> jax.Array:
-        return demonstrate(observation).action
-
-    key_plane, *keys = jax.random.split(key, 1 + _ROUNDS)
-    flat = collect(plane, world, as_taught, demonstrate, rollouts, key_plane)
-    flat, flat_heldout = action_regression.split(flat, len(flat.observation) // rollouts)
-    act, decoder = as_taught, env.decoder(world)
-    seen: list[Demonstrations] = []
-    for number, key_round in enumerate(keys, start=1):
-        key_roll, key_order = jax.random.split(key_round)
-        part = collect(anywhere, world, act, demonstrate, rollouts, key_roll)
-        parts = action_regression.split(part, len(part.observation) // rollouts)
-        training, heldout = (_that_follow(env, demos) for demos in parts)
-        seen = [*seen[1 - _WINDOW :], training]
-        before, _ = action_regression.compare(learner, policy, decoder, heldout)
-        demos = action_regression.join([flat, *seen])
-        epochs = _LAST_EPOCHS if number == _ROUNDS else _EPOCHS
-        policy = action_regression.clone(learner, policy, decoder, demos, key_order, epochs)
-        after, _ = action_regression.compare(learner, policy, decoder, heldout)
-        on_plane, _ = action_regression.compare(learner, policy, decoder, flat_heldout)
+    if learner.model.symmetry is not None and teacher.model.symmetry is None:
         log(
-            f"round {number} of {_ROUNDS}: its servo targets differ by {after:.2f} degrees (rms) "
-            f"now, {before:.1f} before, and on the plane by {on_plane:.2f}"
+            "warning: the other one is not mirror-equivariant, and networks that are cannot follow "
+            "it; network.mirror=false can"
         )
-        act = functools.partial(learner.act, policy)
-    return policy
+    demonstrate = functools.partial(_demonstrate, learner, world, policy, teacher)
+    key_order, *keys = jax.random.split(key, 3)
+    tasks = _on_library_curves(everywhere(env)), on_the_flat(env)
+    collectors = [
+        Collector(learner, task, world, learner.act, demonstrate, key_start)
+        for task, key_start in zip(tasks, keys, strict=True)
+    ]
+    steps = learner.config.num_envs * learner.config.num_steps
+    rollouts = [math.ceil(samples / steps) for samples in (_SAMPLES, _ON_PLANE)]
+    rng = np.random.default_rng(int(jax.random.randint(key_order, (), 0, 2**31 - 1)))
+    cloning = Cloning(learner, policy, env.decoder(world), _ROUNDS * _UPDATES)
+    seen: collections.deque[Demonstrations] = collections.deque(maxlen=2 * _KEPT)
+    begin = time.monotonic()
+    for number in range(_ROUNDS + 1):  # the last one is for the numbers alone
+        parts = [
+            _that_follow(env, collector.collect(cloning.policy, jax.random.split(key_round, count)))
+            for collector, count, key_round in zip(
+                collectors, rollouts, jax.random.split(jax.random.fold_in(key, number)), strict=True
+            )
+        ]
+        miss, on_plane = (
+            action_regression.compare(learner, cloning.policy, env.decoder(world), part)[0]
+            for part in parts
+        )
+        left = (time.monotonic() - begin) / max(number, 1) * (_ROUNDS - number)
+        log(
+            f"after {number} of {_ROUNDS} rounds its servo targets differ by {miss:.2f} degrees "
+            f"(rms) in its own states, on the plane by {on_plane:.2f}"
+            + (f"; {duration(left)} left" if 0 < number < _ROUNDS else "")
+        )
+        if number < _ROUNDS:
+            seen.extend(parts)
+            cloning.learn(seen, _UPDATES, rng)
+    return cloning.policy
 
 
 def _on_library_curves(env: GetUpTask) -> GetUpTask:

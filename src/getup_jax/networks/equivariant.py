@@ -13,6 +13,7 @@ constructing equivariant multilayer perceptrons).
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -58,6 +59,40 @@ class EquivariantMLP(nn.Module):
             return joined(self.image_out, even, even[..., :0])
         odd = nn.Dense(odds, kernel_init=init, use_bias=False, name=f"{OUTPUT_LAYER}_odd")(odd)
         return joined(self.image_out, even, odd)
+
+
+def dense(network: EquivariantMLP, variables: Any) -> dict[str, Any]:
+    """The variables of an `MLP` of the same sizes that computes the same.
+
+    It is equivariant as long as nobody trains it. Hidden sizes must be even.
+    """
+    params, layers = variables["params"], {}
+    hidden = [f"hidden_{index}" for index in range(len(network.hidden_sizes))]
+    size = network.image_in.size
+    for number, name in enumerate([*hidden, OUTPUT_LAYER]):
+        # a layer is affine: its bias is what it makes of zeros, its kernel of the unit vectors
+        rows = _layer(network, params, name, number == 0, jnp.eye(size + 1, size, -1))
+        layers[name] = {"kernel": rows[1:] - rows[0], "bias": rows[0]}
+        size = rows.shape[-1]
+    return {"params": layers}
+
+
+def _layer(
+    network: EquivariantMLP, params: Any, name: str, is_first: bool, x: jax.Array
+) -> jax.Array:
+    """[..., H] of one layer before its activation, pairs as (all first ones, all second ones)."""
+    if is_first:
+        shift = network.image_in.offset
+        even, odd = parts(network.image_in, x if shift is None else x - 0.5 * jnp.asarray(shift))
+    else:
+        left, right = jnp.split(x, 2, axis=-1)
+        even, odd = _HALF * (left + right), _HALF * (left - right)
+    even = even @ params[name]["kernel"] + params[name]["bias"]
+    kernel = params.get(f"{name}_odd", {"kernel": jnp.zeros((odd.shape[-1], 0))})["kernel"]
+    odd = odd @ kernel
+    if name == OUTPUT_LAYER:
+        return joined(network.image_out, even, odd)
+    return jnp.concatenate([_HALF * (even + odd), _HALF * (even - odd)], axis=-1)
 
 
 def sizes(image: SignedPermutation) -> tuple[int, int]:
