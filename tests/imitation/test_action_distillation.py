@@ -18,8 +18,9 @@ from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.build import BuiltTask
 from getup_jax.envs.getup.observation import Observer
 from getup_jax.envs.getup.symmetry import find_symmetry
-from getup_jax.imitation import action_distillation, action_regression
+from getup_jax.imitation import action_distillation, action_regression, demonstrations
 from getup_jax.imitation.action_distillation import Teacher, carry_over, make_teacher
+from getup_jax.imitation.demonstrations import Demonstrations
 from getup_jax.rl.actor_critic import observe
 from getup_jax.rl.learner import Learner
 from getup_jax.rl.state import PolicyState
@@ -94,14 +95,14 @@ def demo_memory() -> dict[str, Any]:
 @pytest.fixture
 def remembered(demo_memory, monkeypatch) -> None:
     """What the old policy sees is collected once for all tests that teach one and the same."""
-    collect = action_regression.collect
+    collect = demonstrations.collect
 
-    def collected_once(*args: Any) -> action_regression.Demonstrations:
+    def collected_once(*args: Any) -> Demonstrations:
         if "old" not in demo_memory:
             demo_memory["old"] = collect(*args)
         return demo_memory["old"]
 
-    monkeypatch.setattr(action_regression, "collect", collected_once)
+    monkeypatch.setattr(demonstrations, "collect", collected_once)
 
 
 def differences(log: list[str]) -> tuple[float, float, float]:
@@ -156,7 +157,7 @@ def test_the_difference_is_the_root_mean_square_in_degrees(task, old):
     action, condition = samples(np.random.default_rng(2), 4)
     observation = jnp.ones((4, learner.env.observation_size))
     target = old.target(learner.act(policy, observation), condition) + math.radians(3.0)
-    demos = action_regression.Demonstrations(observation, action, target, condition)
+    demos = Demonstrations(observation, action, target, condition)
     assert action_regression.compare(learner, policy, old, demos)[0] == pytest.approx(3.0, rel=1e-3)
 
 
@@ -190,10 +191,11 @@ def observed(policy: PolicyState, learner: Learner, seed: int = 0) -> PolicyStat
 
 def lively(policy: PolicyState) -> PolicyState:
     """The policy with an output layer that is far from zero."""
-    kernel = 0.1 * jax.random.normal(KEY, policy.actor["params"]["output"]["kernel"].shape)
-    output = {**policy.actor["params"]["output"], "kernel": kernel}
-    actor = {**policy.actor, "params": {**policy.actor["params"], "output": output}}
-    return dataclasses.replace(policy, actor=actor)
+    params = dict(policy.actor["params"])
+    for name in params.keys() & {"output", "output_odd"}:
+        kernel = 0.1 * jax.random.normal(KEY, params[name]["kernel"].shape)
+        params[name] = {**params[name], "kernel": kernel}
+    return dataclasses.replace(policy, actor={**policy.actor, "params": params})
 
 
 def test_a_policy_is_distilled_into_networks_with_mirror_images(mirrored, monkeypatch):
@@ -235,7 +237,7 @@ def test_what_a_checkpoint_was_trained_with_is_read_off_it(tmp_path, mirrored, t
         loaded = loaded_from(tmp_path / f"case {number}", built, config)
         teacher = make_teacher(CONFIG, learner, mirrored.world, loaded, own)
         assert (teacher.model.symmetry is not None) == expected
-        assert (teacher.weights_for(learner) is not None) == expected
+        assert (teacher.policy_for(learner) is not None) == expected
         assert teacher.decoder.prior.mirrored == built.prior.mirrored
         jax.tree.map(np.testing.assert_array_equal, teacher.policy.actor, loaded.policy["actor"])
 

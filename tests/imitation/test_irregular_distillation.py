@@ -14,7 +14,7 @@ from ground_samples import TERRAIN
 from compiled import first_policy
 from eval_samples import SMALL, make_task, save_policy
 from getup_jax.config import Config, ConfigError, TrainConfig
-from getup_jax.imitation import action_regression, irregular_distillation
+from getup_jax.imitation import incremental_regression, irregular_distillation
 from getup_jax.imitation.action_distillation import Teacher
 from getup_jax.imitation.irregular_distillation import distill_on_irregular
 from getup_jax.runtime.checkpoint import load_policy
@@ -72,8 +72,8 @@ def test_only_bodies_near_their_curves_are_learned_from(built, teacher):
 
 @pytest.mark.slow
 def test_the_policy_learns_from_the_two(built, teacher, monkeypatch):
-    monkeypatch.setattr(action_regression, "_ROUND_MINIBATCH", 64)
-    monkeypatch.setattr(action_regression, "_ROUND_RATES", (1e-3, 1e-4))
+    monkeypatch.setattr(incremental_regression, "_MINIBATCH", 64)
+    monkeypatch.setattr(incremental_regression, "_LEARNING_RATES", (1e-3, 1e-4))
     for name, value in ("_SAMPLES", 1280), ("_ON_PLANE", 640), ("_ROUNDS", 3), ("_UPDATES", 600):
         monkeypatch.setattr(irregular_distillation, name, value)
     task, learner = built
@@ -85,37 +85,7 @@ def test_the_policy_learns_from_the_two(built, teacher, monkeypatch):
     assert last < 0.85 * first, log
     assert plane_first < 1e-3  # where it began with the right weights
     assert plane < last, log
-    assert re.search(r"; \d+ s left$", log[2])
-    assert not re.search("left", log[1] + log[-1])
-
-
-@pytest.mark.slow
-def test_one_learns_from_all_demonstrations_with_one_optimiser(built, monkeypatch):
-    monkeypatch.setattr(action_regression, "_ROUND_MINIBATCH", 32)
-    task, learner = built
-    env, policy = task.environment, first_policy(learner)
-    decoder = env.decoder(task.world)
-    observation = jax.random.normal(KEY, (640, env.observation_size))
-    condition = env.observer.condition(observation)
-    action = 0.3 * jax.random.normal(jax.random.PRNGKey(1), (640, env.action_size))
-    demos = action_regression.Demonstrations(
-        observation, action, decoder.target(action, condition), condition
-    )
-    demos = jax.tree.map(np.asarray, demos)
-    parts = [jax.tree.map(lambda x, s=s: x[s], demos) for s in (slice(0, 100), slice(100, 640))]
-    cloning = action_regression.Cloning(learner, policy, decoder, updates=1000)
-
-    def misses(policy):
-        return [action_regression.compare(learner, policy, decoder, part)[0] for part in parts]
-
-    before = misses(policy)
-    cloning.learn(parts, 500, np.random.default_rng(0))
-    halfway = misses(cloning.policy)
-    cloning.learn(parts[:1], 500, np.random.default_rng(0))
-    after = misses(cloning.policy)
-    assert all(b < 0.9 * a for a, b in zip(before, halfway, strict=True)), (before, halfway)
-    assert after[0] < 0.9 * halfway[0], (halfway, after)
-    assert misses(policy) == before
+    assert all(("left" in line) == (0 < number < 3) for number, line in enumerate(log[1:]))
 
 
 @pytest.mark.parametrize(

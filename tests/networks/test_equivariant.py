@@ -88,3 +88,9 @@ def test_a_dense_network_can_do_the_same(hidden, image):
     shapes = jax.tree.map(np.shape, mlp.init(jax.random.PRNGKey(1), X[0]))
     assert jax.tree.map(np.shape, expanded) == shapes
     np.testing.assert_allclose(mlp.apply(expanded, X), net.apply(variables, X), atol=2e-5)
+
+
+def test_one_with_an_odd_size_has_no_dense_one_of_that_size():
+    net, variables = make((32, 15))
+    with pytest.raises(ValueError, match=r"hidden_sizes: expected even ones, got \(32, 15\)"):
+        dense(net, variables)

@@ -96,7 +96,7 @@ class TrainConfig:
     wandb: str | None = None  # project on Weights & Biases, extra: wandb; None: off
     init_from: str | None = None  # a checkpoint whose policy starts the run
     # another one, of irregular ground: it teaches there what init_from, of a plane, does not know;
-    # where it was not trained with network.mirror, networks that are to follow it are without, too
+    # needs network.mirror=false here if it was trained so, since what it does has no mirror image
     irregular_from: str | None = None
     # also its critic, optimiser, curriculum and which starts are learned: the same task goes on
     # with another number of simulations or on another engine; `ppo.critic_first` is not needed

@@ -25,8 +25,8 @@ from getup_jax.envs.getup.action_decoder import ActionDecoder
 from getup_jax.envs.getup.observation import Observer
 from getup_jax.envs.getup.symmetry import find_symmetry
 from getup_jax.envs.getup.task import GetUpTask, World
-from getup_jax.imitation import action_regression
-from getup_jax.imitation.action_regression import Demonstrations
+from getup_jax.imitation import action_regression, demonstrations
+from getup_jax.imitation.demonstrations import Demonstrations
 from getup_jax.networks.equivariant import EquivariantMLP, dense
 from getup_jax.pose_prior import prior as pose_prior
 from getup_jax.pose_prior.prior import PosePrior
@@ -74,23 +74,25 @@ class Teacher:
             condition=condition,
         )
 
-    def weights_for(self, learner: Learner) -> PolicyState | None:
+    def policy_for(self, learner: Learner) -> PolicyState | None:
         """Its policy for the networks there, None where they need others.
 
         What an action means may still differ.
         """
-        env, own, there = learner.env, self.model.actor, learner.model.actor
+        env, was, now = learner.env, self.model, learner.model
         if (
             self.lookahead_s != env.config.lookahead_s
             or self.observer.table != env.observer.table
-            or (own.hidden_sizes, own.activation) != (there.hidden_sizes, there.activation)
+            or (was.actor.hidden_sizes, was.actor.activation, was.initial_std is None)
+            != (now.actor.hidden_sizes, now.actor.activation, now.initial_std is None)
         ):
             return None
-        if (self.model.symmetry is None) == (learner.model.symmetry is None):
+        if (was.symmetry is None) == (now.symmetry is None):
             return self.policy
-        if not isinstance(own, EquivariantMLP) or any(size % 2 for size in own.hidden_sizes):
+        is_even = all(size % 2 == 0 for size in was.actor.hidden_sizes)
+        if not isinstance(was.actor, EquivariantMLP) or not is_even:
             return None
-        return dataclasses.replace(self.policy, actor=dense(own, self.policy.actor))
+        return dataclasses.replace(self.policy, actor=dense(was.actor, self.policy.actor))
 
 
 def make_teacher(
@@ -202,7 +204,7 @@ def carry_over(
     """
     env = learner.env
     assert isinstance(env, GetUpTask)
-    decoder, begun = env.decoder(world), teacher.weights_for(learner)
+    decoder, begun = env.decoder(world), teacher.policy_for(learner)
     if begun is not None and teacher.decoder.same(decoder):
         return begun
     log("its networks, observation, prior or offsets are others: distilling it into this run's ...")
@@ -215,8 +217,8 @@ def carry_over(
     rollouts = 1 + math.ceil(_SAMPLES / (learner.config.num_envs * learner.config.num_steps))
     for number, key_round in enumerate(jax.random.split(key, _ROUNDS)):
         key_roll, key_order = jax.random.split(key_round)
-        part = action_regression.collect(learner, env, world, act, demonstrate, rollouts, key_roll)
-        training, heldout = action_regression.split(part, len(part.observation) // rollouts)
+        part = demonstrations.collect(learner, env, world, act, demonstrate, rollouts, key_roll)
+        training, heldout = demonstrations.split(part, len(part.observation) // rollouts)
         seen.append(training)
         if number == 0:
             statistics = _statistics(teacher, env, training.observation)
@@ -224,7 +226,7 @@ def carry_over(
             policy = learner.model.symmetric(policy)
         before, _ = action_regression.compare(learner, policy, decoder, heldout)
         policy = action_regression.clone(
-            learner, policy, decoder, action_regression.join(seen), key_order
+            learner, policy, decoder, demonstrations.join(seen), key_order
         )
         after, offsets = action_regression.compare(learner, policy, decoder, heldout)
         log(

@@ -5,7 +5,7 @@ another policy has made them, they need not be made again: each of the two teach
 the ground that it knows (policy distillation from several teachers, Rusu et al. 2016), in the
 states that the new one gets to itself (DAgger, Ross et al. 2011). It begins with the weights of the
 first, as if the map were even. Networks that are mirror-equivariant cannot follow a teacher that is
-not: what it does left and right, they would do half of at once.
+not: they learn the mean of what it does in a state and the image of what it does in its image.
 """
 
 from __future__ import annotations
@@ -24,16 +24,17 @@ from getup_jax.envs.getup import rewards
 from getup_jax.envs.getup.task import GetUpTask, World
 from getup_jax.imitation import action_regression
 from getup_jax.imitation.action_distillation import Teacher
-from getup_jax.imitation.action_regression import Cloning, Collector, Demonstrations, Log
+from getup_jax.imitation.demonstrations import Collector, Demonstrations, Log
+from getup_jax.imitation.incremental_regression import IncrementalRegression
 from getup_jax.imitation.slope_warm_start import as_if_even, everywhere, on_the_flat
 from getup_jax.rl.learner import Learner
 from getup_jax.rl.state import PolicyState
 from getup_jax.runtime.console import duration
 
 _ROUNDS = 40
-_SAMPLES, _ON_PLANE = 90_000, 30_000  # of a round, at least: anywhere, and of the plane alone
-_KEPT = 9  # rounds whose samples are learned from
 _UPDATES = 500  # of a round
+_SAMPLES, _ON_PLANE = 90_000, 30_000  # of a round: anywhere, and of the plane alone
+_KEPT = 9  # rounds whose samples are learned from
 _FOLLOWS = 0.3  # r_h r_theta; further off, no teacher knows what to do, and all are told otherwise
 _EVEN_M = 1e-3  # differences within the height map, which rounding makes, too
 
@@ -53,7 +54,7 @@ def distill_on_irregular(
         world: of the new run.
         policy: of the new run, from one that knows a plane alone.
         teacher: a policy that was trained on irregular ground.
-        key: of the starts, the noise and the order of the minibatches.
+        key: of the starts, the noise and which samples are learned from.
         log: gets a line for each round.
     """
     env = learner.env
@@ -65,39 +66,56 @@ def distill_on_irregular(
             "it; network.mirror=false can"
         )
     demonstrate = functools.partial(_demonstrate, learner, world, policy, teacher)
-    key_order, *keys = jax.random.split(key, 3)
+    key_rounds, key_samples, *keys = jax.random.split(key, 4)
     tasks = _on_library_curves(everywhere(env)), on_the_flat(env)
-    collectors = [
+    anywhere, plane = (
         Collector(learner, task, world, learner.act, demonstrate, key_start)
         for task, key_start in zip(tasks, keys, strict=True)
-    ]
-    steps = learner.config.num_envs * learner.config.num_steps
-    rollouts = [math.ceil(samples / steps) for samples in (_SAMPLES, _ON_PLANE)]
-    rng = np.random.default_rng(int(jax.random.randint(key_order, (), 0, 2**31 - 1)))
-    cloning = Cloning(learner, policy, env.decoder(world), _ROUNDS * _UPDATES)
+    )
+    rng = np.random.default_rng(np.asarray(jax.random.key_data(key_samples)))
+    regression = IncrementalRegression(learner, policy, env.decoder(world), _ROUNDS * _UPDATES)
     seen: collections.deque[Demonstrations] = collections.deque(maxlen=2 * _KEPT)
     begin = time.monotonic()
     for number in range(_ROUNDS + 1):  # the last one is for the numbers alone
-        parts = [
-            _that_follow(env, collector.collect(cloning.policy, jax.random.split(key_round, count)))
-            for collector, count, key_round in zip(
-                collectors, rollouts, jax.random.split(jax.random.fold_in(key, number)), strict=True
-            )
-        ]
-        miss, on_plane = (
-            action_regression.compare(learner, cloning.policy, env.decoder(world), part)[0]
-            for part in parts
-        )
-        left = (time.monotonic() - begin) / max(number, 1) * (_ROUNDS - number)
+        misses = []
+        key_anywhere, key_plane = jax.random.split(jax.random.fold_in(key_rounds, number))
+        for collector, samples, key_roll in (
+            (anywhere, _SAMPLES, key_anywhere),
+            (plane, _ON_PLANE, key_plane),
+        ):
+            part = _new(learner, collector, regression.policy, samples, key_roll, rng)
+            decoder = env.decoder(world)
+            misses.append(action_regression.compare(learner, regression.policy, decoder, part)[0])
+            seen.append(_that_follow(env, part))
         log(
-            f"after {number} of {_ROUNDS} rounds its servo targets differ by {miss:.2f} degrees "
-            f"(rms) in its own states, on the plane by {on_plane:.2f}"
-            + (f"; {duration(left)} left" if 0 < number < _ROUNDS else "")
+            f"after {number} of {_ROUNDS} rounds its servo targets differ by {misses[0]:.2f} "
+            f"degrees (rms) in its own states, on the plane by {misses[1]:.2f}"
+            + _time_left(time.monotonic() - begin, number)
         )
         if number < _ROUNDS:
-            seen.extend(parts)
-            cloning.learn(seen, _UPDATES, rng)
-    return cloning.policy
+            regression.learn(seen, _UPDATES, rng)
+    return regression.policy
+
+
+def _new(
+    learner: Learner,
+    collector: Collector,
+    policy: PolicyState,
+    samples: int,
+    key: jax.Array,
+    rng: np.random.Generator,
+) -> Demonstrations:
+    """So many, drawn from as many whole rollouts as they need."""
+    steps = learner.config.num_envs * learner.config.num_steps
+    part = collector.collect(policy, jax.random.split(key, math.ceil(samples / steps)))
+    kept = rng.choice(len(part.target), samples, replace=False)
+    return jax.tree.map(lambda x: x[kept], part)
+
+
+def _time_left(seconds: float, done: int) -> str:
+    if not 0 < done < _ROUNDS:
+        return ""
+    return f"; about {duration(seconds / done * (_ROUNDS - done))} left"
 
 
 def _on_library_curves(env: GetUpTask) -> GetUpTask:

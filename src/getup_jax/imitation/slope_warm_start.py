@@ -22,8 +22,8 @@ import numpy as np
 
 from getup_jax.envs.getup.episode import STANDING, EpisodeState
 from getup_jax.envs.getup.task import GetUpTask, World
-from getup_jax.imitation import action_regression
-from getup_jax.imitation.action_regression import Demonstrations, Log
+from getup_jax.imitation import action_regression, demonstrations
+from getup_jax.imitation.demonstrations import Demonstrations, Log
 from getup_jax.rl.learner import Learner
 from getup_jax.rl.state import PolicyState
 
@@ -50,7 +50,7 @@ def warm_start_on_slopes(
     keys = jax.random.split(key, _HELD + 3)
     as_it_is = functools.partial(as_if_even, learner, world, policy)
     act = functools.partial(learner.act, policy)
-    own = action_regression.collect(learner, on_the_flat(env), world, act, as_it_is, _OWN, keys[0])
+    own = demonstrations.collect(learner, on_the_flat(env), world, act, as_it_is, _OWN, keys[0])
     anywhere = everywhere(env)
     stretched = _stretched(env)
 
@@ -58,11 +58,11 @@ def warm_start_on_slopes(
         demos = as_it_is(observation)
         return demos.replace(target=stretched(demos.target, demos.condition))
 
-    rising = action_regression.collect(learner, anywhere, world, act, head_up, _RISING, keys[2])
+    rising = demonstrations.collect(learner, anywhere, world, act, head_up, _RISING, keys[2])
     low = np.asarray(rising.condition[:, 0]) < _RISES * float(np.max(world.points[:, -1, 0]))
     rising = jax.tree.map(lambda x: x[low], rising)
     held = [_held(learner, env, world, k) for k in keys[3:]]
-    training = action_regression.join([own, rising, *held[:-1]])
+    training = demonstrations.join([own, rising, *held[:-1]])
     before, _ = action_regression.compare(learner, policy, decoder, held[-1])
     policy = action_regression.clone(learner, policy, decoder, training, keys[1])
     after, _ = action_regression.compare(learner, policy, decoder, held[-1])

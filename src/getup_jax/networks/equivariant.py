@@ -64,14 +64,17 @@ class EquivariantMLP(nn.Module):
 def dense(network: EquivariantMLP, variables: Any) -> dict[str, Any]:
     """The variables of an `MLP` of the same sizes that computes the same.
 
-    It is equivariant as long as nobody trains it. Hidden sizes must be even.
+    It is equivariant as long as nobody trains it. Raises ValueError for a hidden size that is odd.
     """
+    if any(size % 2 for size in network.hidden_sizes):
+        raise ValueError(f"hidden_sizes: expected even ones, got {network.hidden_sizes}")
     params, layers = variables["params"], {}
     hidden = [f"hidden_{index}" for index in range(len(network.hidden_sizes))]
     size = network.image_in.size
     for number, name in enumerate([*hidden, OUTPUT_LAYER]):
         # a layer is affine: its bias is what it makes of zeros, its kernel of the unit vectors
-        rows = _layer(network, params, name, number == 0, jnp.eye(size + 1, size, -1))
+        with jax.default_matmul_precision("highest"):
+            rows = _layer(network, params, name, number == 0, jnp.eye(size + 1, size, -1))
         layers[name] = {"kernel": rows[1:] - rows[0], "bias": rows[0]}
         size = rows.shape[-1]
     return {"params": layers}

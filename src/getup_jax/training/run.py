@@ -74,17 +74,17 @@ def build_job(config: Config, log: Log) -> Job:
 def _carry_over(learner: Learner, world: World, config: Config) -> CarryOver:
     def carry_over(policy: PolicyState, loaded: LoadedPolicy, log: Log) -> PolicyState:
         teacher = action_distillation.make_teacher(config, learner, world, loaded, policy)
-        key = jax.random.PRNGKey(config.seed)
+        key, key_ground = jax.random.split(jax.random.PRNGKey(config.seed))
         policy = action_distillation.carry_over(learner, world, policy, teacher, key, log)
         on_plane = learner.env.terrain is None or loaded.config.terrain is not None
         if config.train.irregular_from is not None:
             other = _knows_irregular_ground(config, loaded)
             where = "train.irregular_from"
             teacher = action_distillation.make_teacher(config, learner, world, other, policy, where)
-            return distill_on_irregular(learner, world, policy, teacher, key, log)
+            return distill_on_irregular(learner, world, policy, teacher, key_ground, log)
         if world.prior is None or on_plane:
             return policy
-        return warm_start_on_slopes(learner, world, policy, key, log)
+        return warm_start_on_slopes(learner, world, policy, key_ground, log)
 
     return carry_over
 
