@@ -220,9 +220,9 @@ def test_networks_without_mirror_images_begin_with_weights_that_have_them(mirror
     begun = carry_over(learner, mirrored.world, own, teacher, KEY, log.append)
     assert log == []  # nothing has to be distilled
     seen = jax.random.normal(KEY, (16, learner.env.observation_size))
-    expected = taught_before.act(policy, seen)
+    expected = jax.jit(taught_before.act)(policy, seen)
     assert np.abs(expected).max() > 0.5
-    np.testing.assert_allclose(learner.act(begun, seen), expected, atol=1e-4)
+    np.testing.assert_allclose(jax.jit(learner.act)(begun, seen), expected, atol=1e-4)
 
 
 def loaded_from(folder, task: BuiltTask, config: Config) -> LoadedPolicy:
