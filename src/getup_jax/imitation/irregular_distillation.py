@@ -66,6 +66,7 @@ def distill_on_irregular(
             "it; network.mirror=false can"
         )
     demonstrate = functools.partial(_demonstrate, learner, world, policy, teacher)
+    decoder = env.decoder(world)
     key_rounds, key_samples, *keys = jax.random.split(key, 4)
     tasks = _on_library_curves(everywhere(env)), on_the_flat(env)
     anywhere, plane = (
@@ -73,7 +74,7 @@ def distill_on_irregular(
         for task, key_start in zip(tasks, keys, strict=True)
     )
     rng = np.random.default_rng(np.asarray(jax.random.key_data(key_samples)))
-    regression = IncrementalRegression(learner, policy, env.decoder(world), _ROUNDS * _UPDATES)
+    regression = IncrementalRegression(learner, policy, decoder, _ROUNDS * _UPDATES)
     seen: collections.deque[Demonstrations] = collections.deque(maxlen=2 * _KEPT)
     begin = time.monotonic()
     for number in range(_ROUNDS + 1):  # the last one is for the numbers alone
@@ -84,7 +85,6 @@ def distill_on_irregular(
             (plane, _ON_PLANE, key_plane),
         ):
             part = _new(learner, collector, regression.policy, samples, key_roll, rng)
-            decoder = env.decoder(world)
             misses.append(action_regression.compare(learner, regression.policy, decoder, part)[0])
             seen.append(_that_follow(env, part))
         log(
