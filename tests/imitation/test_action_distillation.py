@@ -73,6 +73,15 @@ def test_the_latent_is_that_of_the_old_pose_and_not_of_the_offsets(task, old):
     np.testing.assert_allclose(moved[:, 16:], 2.0 * action[:, 16:], atol=1e-5)
 
 
+def test_a_prior_alike_keeps_the_action(task):
+    """Its pose encoded anew would have other latents: a teacher saw what no policy had done."""
+    action, condition = samples(np.random.default_rng(2), 8)
+    first, second = (
+        ActionDecoder(untrained_prior(task.environment.character, seed=0), 0.5) for _ in range(2)
+    )
+    np.testing.assert_array_equal(first.translate(action, condition, second), action)
+
+
 def teacher_of(learner: Learner, policy: PolicyState, decoder: ActionDecoder) -> Teacher:
     return Teacher(
         learner.model, policy, decoder, learner.env.observer, learner.env.config.lookahead_s

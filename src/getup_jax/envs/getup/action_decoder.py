@@ -103,7 +103,12 @@ class ActionDecoder:
         return pose_prior.encode_action(self.prior, angles, condition)
 
     def translate(self, action: jax.Array, condition: jax.Array, new: ActionDecoder) -> jax.Array:
-        """Another decoder's action [..., A'] that has the servo target of this one [..., A]."""
+        """Another decoder's action [..., A'] that has the servo target of this one [..., A].
+
+        The same action where it means the same there: poses encoded anew have other latents.
+        """
+        if self.same(new):
+            return action
         return new.action(self.pose(action, condition), self.target(action, condition), condition)
 
     def same(self, other: ActionDecoder) -> bool:
