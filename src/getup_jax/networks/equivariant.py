@@ -42,16 +42,14 @@ class EquivariantMLP(nn.Module):
     def __call__(self, x: jax.Array) -> jax.Array:
         """The outputs for inputs x[..., I]; no activation after the last layer."""
         nonlinear = ACTIVATIONS[self.activation]
-        if self.image_in.offset is not None:  # M x = x there; M is linear around it
-            x = x - 0.5 * jnp.asarray(self.image_in.offset)
-        even, odd = parts(self.image_in, x)
+        even, odd = _parts_around(self.image_in, x)
         init = nn.initializers.orthogonal(math.sqrt(2.0))
         for index, size in enumerate(self.hidden_sizes):
             pairs, name = (size + 1) // 2, f"hidden_{index}"
             even = nn.Dense(pairs, kernel_init=init, name=name)(even)
             odd = nn.Dense(pairs, kernel_init=init, use_bias=False, name=f"{name}_odd")(odd)
-            left, right = nonlinear(_HALF * (even + odd)), nonlinear(_HALF * (even - odd))
-            even, odd = _HALF * (left + right), _HALF * (left - right)
+            left, right = _turned(even, odd)
+            even, odd = _turned(nonlinear(left), nonlinear(right))
         init = nn.initializers.orthogonal(self.output_scale)
         evens, odds = sizes(self.image_out)
         even = nn.Dense(evens, kernel_init=init, name=OUTPUT_LAYER)(even)
@@ -85,17 +83,25 @@ def _layer(
 ) -> jax.Array:
     """[..., H] of one layer before its activation, pairs as (all first ones, all second ones)."""
     if is_first:
-        shift = network.image_in.offset
-        even, odd = parts(network.image_in, x if shift is None else x - 0.5 * jnp.asarray(shift))
+        even, odd = _parts_around(network.image_in, x)
     else:
-        left, right = jnp.split(x, 2, axis=-1)
-        even, odd = _HALF * (left + right), _HALF * (left - right)
+        even, odd = _turned(*jnp.split(x, 2, axis=-1))
     even = even @ params[name]["kernel"] + params[name]["bias"]
     kernel = params.get(f"{name}_odd", {"kernel": jnp.zeros((odd.shape[-1], 0))})["kernel"]
     odd = odd @ kernel
     if name == OUTPUT_LAYER:
         return joined(network.image_out, even, odd)
-    return jnp.concatenate([_HALF * (even + odd), _HALF * (even - odd)], axis=-1)
+    return jnp.concatenate(_turned(even, odd), axis=-1)
+
+
+def _turned(a: jax.Array, b: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """The two units of pairs from their coordinates, and these from those: its own inverse."""
+    return _HALF * (a + b), _HALF * (a - b)
+
+
+def _parts_around(image: SignedPermutation, x: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """`parts` of what x [..., N] is beside the point that is its own image: M is linear there."""
+    return parts(image, x if image.offset is None else x - 0.5 * jnp.asarray(image.offset))
 
 
 def sizes(image: SignedPermutation) -> tuple[int, int]:
