@@ -130,3 +130,10 @@ def test_a_card_says_on_which_motions_curves_and_ground_a_policy_was_tried():
     ):
         assert part in said
     assert "there/" not in said
+
+
+def test_the_cards_of_shipped_policies_say_their_names():
+    for card in asset_path("checkpoints").glob(f"*/{CARD}"):
+        text, name = card.read_text(), card.parent.name
+        assert text.startswith(f"# Policy `{name}`\n")
+        assert f"getup-eval --ckpt {name}\n" in text
