@@ -104,7 +104,7 @@ def test_the_same_body_and_unknown_ones_give_no_warning(metadata, known):
     assert lines == []
 
 
-@pytest.mark.parametrize("name", ["flat", "getup", "terrain", "walk", "walk_aim", "wave_squat"])
+@pytest.mark.parametrize("name", ["crouch", "flat", "getup", "terrain", "walk", "walk_aim", "wave_squat"])
 def test_shipped_policies_know_the_body_of_their_settings(name):
     folder = asset_path("checkpoints", name)
     config = load_saved_config(folder / "config.yaml")
