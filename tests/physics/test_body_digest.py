@@ -14,6 +14,7 @@ from getup_jax.physics.body_digest import KEY, body_digest, warn_if_other
 from getup_jax.physics.character import load_character
 from getup_jax.physics.props import Equipment
 from getup_jax.physics.terrain_map import make_terrain
+from getup_jax.runtime.checkpoint import shipped_policies
 
 OWN = asset_path("humanoid49.xml").read_text()
 
@@ -104,7 +105,7 @@ def test_the_same_body_and_unknown_ones_give_no_warning(metadata, known):
     assert lines == []
 
 
-@pytest.mark.parametrize("name", ["crouch", "flat", "getup", "terrain", "walk", "walk_aim", "wave_squat"])
+@pytest.mark.parametrize("name", shipped_policies())
 def test_shipped_policies_know_the_body_of_their_settings(name):
     folder = asset_path("checkpoints", name)
     config = load_saved_config(folder / "config.yaml")
