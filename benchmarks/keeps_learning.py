@@ -1,6 +1,6 @@
 """Does training on keep what a policy can do? A guard over the learner.
 
-    python benchmarks/keeps_learning.py flat [--steps 5e6] [--run FOLDER] [section.key=value ...]
+    python benchmarks/keeps_learning.py flat [--steps 5e6] [--run FOLDER] [--quick] [key=value ...]
     python benchmarks/keeps_learning.py terrain walk --steps 1e6 --json out.json
 
 Every named policy is evaluated as it is shipped, trained on without help for some steps, and
@@ -15,6 +15,7 @@ import argparse
 import dataclasses
 import json
 import math
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,7 @@ _GETUP = (
     "curriculum.short_share=0",
     "ppo.action_std=[0.2,0.2]",
 )
+_QUICK = ("ppo.num_envs=16", "ppo.num_steps=8", "ppo.minibatch_size=128")
 Values = dict[str, np.ndarray]  # measure -> [N], one number an episode, larger is better
 
 
@@ -70,6 +72,7 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, help="of an evaluation (default: 64 to 400)")
     parser.add_argument("--run", type=Path, default=Path("runs/keeps_learning"), metavar="FOLDER")
     parser.add_argument("--json", type=Path, metavar="FILE")
+    parser.add_argument("--quick", action="store_true", help="the first policy, one iteration")
     args = parser.parse_intermixed_args()
     settings = [word for word in args.words if "=" in word]
     names = [word for word in args.words if "=" not in word] or list(CASES)
@@ -77,11 +80,15 @@ def main() -> None:
     if unknown:
         parser.error(f"{', '.join(unknown)}: expected one of {', '.join(CASES)}")
     found = {}
-    for name in names:
-        case = CASES[name]
-        number = args.episodes or case.episodes
-        found[name] = guard(name, case, settings, int(args.steps), number, args.run / name)
-        print(table(name, found[name]))
+    with tempfile.TemporaryDirectory() as scratch:
+        if args.quick:  # never in the folder of a run that is to go on
+            names, settings = names[:1], [*_QUICK, *settings]
+            args.steps, args.episodes, args.run = 1, args.episodes or 4, Path(scratch)
+        for name in names:
+            case = CASES[name]
+            number = args.episodes or case.episodes
+            found[name] = guard(name, case, settings, int(args.steps), number, args.run / name)
+            print(table(name, found[name]))
     if args.json is not None:
         args.json.write_text(json.dumps(found, indent=2) + "\n")
 

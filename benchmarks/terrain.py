@@ -186,7 +186,7 @@ def time_falls(
 ) -> dict[str, float]:
     begin = time.perf_counter()
     rng = np.random.default_rng(config.seed)
-    fall(character, ground, evenly(count), DROPS["limp"], rng, print)
+    fall(character, ground, evenly(count), DROPS["limp"][0], rng, print)
     return {"drops": count, "seconds": time.perf_counter() - begin}
 
 

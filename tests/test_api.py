@@ -75,7 +75,7 @@ def test_what_is_not_possible_is_one_line(policy):
         gj.make_env(policy, num_envs=0)
     with pytest.raises(ConfigError, match="a scenario or training=True, got both"):
         gj.make_env(policy, scenario=gj.Scenario(), training=True)
-    with pytest.raises(CheckpointError, match="shipped policies: flat"):
+    with pytest.raises(CheckpointError, match=r"shipped policies: .*flat"):
         gj.load_policy("falt")
     with pytest.raises(AttributeError, match="has no attribute 'fly'"):
         _ = gj.fly

@@ -42,7 +42,8 @@ class TaskConfig:
     # share of the lying starts on flat ground that are limp bodies, not the motions' own poses; on
     # irregular ground all of them are
     limp_share: float = number(0.0, least=0, most=1)
-    drop_as: str = "limp"  # how these are dropped: limp | any | paper, see DROPS in rag_doll.py
+    # how these are dropped: limp | any | paper | varied, see DROPS in rag_doll.py
+    drop_as: str = "limp"
     # how many on flat ground; terrain.drops on irregular ground
     limp_drops: int = number(1000, least=1, most=1_000_000)
     # share of them that stood, were pushed and fell
@@ -52,5 +53,5 @@ class TaskConfig:
         check_numbers(self, "task")
         now = self.lookahead_s[:1] == (0.0,)
         require(now, "task.lookahead_s", "times that start with 0, the present", self.lookahead_s)
-        drops = ("limp", "any", "paper")
+        drops = ("limp", "any", "paper", "varied")
         require(self.drop_as in drops, "task.drop_as", f"one of {drops}", self.drop_as)

@@ -237,7 +237,8 @@ def description(loaded: LoadedPolicy, scenario: Scenario, episodes: Episodes) ->
 
 
 def _drop(task: TaskConfig) -> dict[str, Any]:
-    return {**dataclasses.asdict(DROPS[task.drop_as]), "fallen_share": task.fallen_share}
+    ways = [dataclasses.asdict(drop) for drop in DROPS[task.drop_as]]
+    return {"ways": ways, "fallen_share": task.fallen_share}
 
 
 class Rate:

@@ -129,11 +129,11 @@ def _add_conditions(group: argparse._ArgumentGroup) -> None:
     )
     add(
         "--drops",
-        choices=("paper", "limp", "any", "fallen"),
+        choices=("paper", "limp", "any", "varied", "fallen"),
         help="how bodies came to lie, on flat ground too: paper: dropped prone or supine in the "
         "neutral pose, with weak servos; limp: prone, supine or on a side, all hinges bent at "
-        "random, servos off; any: limp in every orientation; fallen: pushed over (default: the "
-        "motions' first poses on flat ground, limp elsewhere)",
+        "random, servos off; any: limp in every orientation; varied: half any, half paper; "
+        "fallen: pushed over (default: the motions' first poses on flat ground, limp elsewhere)",
     )
     styles = group.add_mutually_exclusive_group()
     styles.add_argument(

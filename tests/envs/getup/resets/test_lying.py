@@ -34,7 +34,7 @@ def test_falls_that_never_rest_are_an_error(site, monkeypatch):
     monkeypatch.setattr(lying, "_MOST_FALLS", 1)
     rng = np.random.default_rng(0)
     with pytest.raises(ConfigError, match=r"do not come to rest in the region 'easy'"):
-        fall(site.character, site.ground, evenly(3), DROPS["limp"], rng, lambda text: None)
+        fall(site.character, site.ground, evenly(3), DROPS["limp"][0], rng, lambda text: None)
 
 
 def test_weak_servos_have_a_share_of_the_torque(character):

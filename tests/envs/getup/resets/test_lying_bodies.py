@@ -53,7 +53,7 @@ def test_the_pushed_ones_are_a_share_of_all(character, made):
     assert starts is not None
     np.testing.assert_array_equal(starts.region, np.zeros(10))
     assert [(wanted, drop) for wanted, drop, _ in made] == [
-        ([7, 0, 0, 0], DROPS["limp"]),
+        ([7, 0, 0, 0], DROPS["limp"][0]),
         ([3, 0, 0, 0], None),
     ]
 
@@ -63,19 +63,30 @@ def test_on_slopes_the_regions_have_as_many(character, made):
     starts = bodies(character, drop_as="paper", fallen_share=0.5).on_slopes(12, none)
     np.testing.assert_array_equal(np.bincount(starts.region), [0, 4, 4, 4])
     assert [(wanted, drop) for wanted, drop, _ in made] == [
-        ([0, 2, 2, 2], DROPS["paper"]),
+        ([0, 2, 2, 2], DROPS["paper"][0]),
         ([0, 2, 2, 2], None),
     ]
 
 
 def test_they_are_made_once_and_every_way_has_files_of_its_own(character, made, tmp_path):
     for _ in range(2):
-        for drop in DROPS:
+        for drop in ("limp", "any", "paper"):
             bodies(character, limp_share=1.0, limp_drops=4, drop_as=drop).on_the_flat()
-    assert len(made) == len(DROPS)
+    assert len(made) == 3
     bodies(character, limp_share=1.0, limp_drops=4).on_slopes(4, Starts.none(character))
-    assert len(made) == len(DROPS) + 1
-    assert len(list(tmp_path.glob("starts/*.npz"))) == len(DROPS) + 1
+    assert len(made) == 4
+    assert len(list(tmp_path.glob("starts/*.npz"))) == 4
+
+
+@pytest.mark.parametrize("number", [6, 7])
+def test_varied_ones_are_dropped_in_every_way(character, made, number):
+    starts = bodies(character, limp_share=1.0, limp_drops=number, drop_as="varied").on_the_flat()
+    assert starts is not None
+    np.testing.assert_array_equal(starts.region, np.zeros(number))
+    assert [(sum(wanted), drop) for wanted, drop, _ in made] == [
+        (number - 3, DROPS["any"][0]),
+        (3, DROPS["paper"][0]),
+    ]
 
 
 def test_another_number_on_the_flat_is_of_other_bodies(character, made):

@@ -16,12 +16,16 @@ def fall(site, count: int, seed: int) -> Starts:
     """Limp bodies in the irregular regions."""
     rng = np.random.default_rng(seed)
     wanted = evenly(count)
-    return rag_doll.fall(site.character, site.ground, wanted, DROPS["limp"], rng, lambda text: None)
+    return rag_doll.fall(
+        site.character, site.ground, wanted, DROPS["limp"][0], rng, lambda text: None
+    )
 
 
 def on_the_plane(character, count: int, drop: str) -> Starts:
     rng = np.random.default_rng(0)
-    return rag_doll.fall(character, Plane(), np.array([count]), DROPS[drop], rng, lambda text: None)
+    return rag_doll.fall(
+        character, Plane(), np.array([count]), DROPS[drop][0], rng, lambda text: None
+    )
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from getup_jax.core.resources import cache_dir
 from getup_jax.envs.getup.resets.cache import Maker, Request, cached_starts
 from getup_jax.envs.getup.resets.knock_downs import knock_down
 from getup_jax.envs.getup.resets.lying import Log, Place, Starts
-from getup_jax.envs.getup.resets.rag_doll import DROPS, evenly, fall
+from getup_jax.envs.getup.resets.rag_doll import DROPS, Drop, evenly, fall
 from getup_jax.physics.character import CharacterSpec
 from getup_jax.physics.terrain_map import REGIONS
 
@@ -31,11 +31,14 @@ class LimpBodies:
         if self.config.limp_share == 0:
             return None
         dropped, pushed = self._numbers(self.config.limp_drops)
-        name, first = DROPS[self.config.drop_as].name, np.arange(len(REGIONS)) == 0
+        first = np.arange(len(REGIONS)) == 0
         # with their number in the seed: an evaluation drops another number, so all others
         return Starts.join(
             [
-                self._dropped(f"{name}-flat", dropped * first, (self.seed, dropped)),
+                *(
+                    self._dropped(drop, f"{drop.name}-flat", count * first, (self.seed, count))
+                    for drop, count in self._ways(dropped)
+                ),
                 self._pushed("pushed-flat", pushed * first, None),
             ]
         )
@@ -43,10 +46,12 @@ class LimpBodies:
     def on_slopes(self, count: int, standing: Starts) -> Starts:
         """`count` of them, equally many in every irregular region; standing: what may be pushed."""
         dropped, pushed = self._numbers(count)
-        name = DROPS[self.config.drop_as].name
         return Starts.join(
             [
-                self._dropped(name, evenly(dropped), self.seed),
+                *(
+                    self._dropped(drop, drop.name, evenly(number), self.seed)
+                    for drop, number in self._ways(dropped)
+                ),
                 self._pushed("pushed", evenly(pushed), standing),
             ]
         )
@@ -56,9 +61,19 @@ class LimpBodies:
         pushed = round(self.config.fallen_share * count)
         return count - pushed, pushed
 
-    def _dropped(self, name: str, wanted: np.ndarray, seed: int | tuple[int, int]) -> Starts:
+    def _ways(self, dropped: int) -> list[tuple[Drop, int]]:
+        """The ways in which the config has bodies dropped, and how many fall in each."""
+        drops = DROPS[self.config.drop_as]
+        return [
+            (drop, dropped // len(drops) + (i < dropped % len(drops)))
+            for i, drop in enumerate(drops)
+        ]
+
+    def _dropped(
+        self, drop: Drop, name: str, wanted: np.ndarray, seed: int | tuple[int, int]
+    ) -> Starts:
         def make(request: Request, log: Log) -> Starts:
-            drop, rng = DROPS[self.config.drop_as], np.random.default_rng(seed)
+            rng = np.random.default_rng(seed)
             return fall(self.character, self.place, wanted, drop, rng, log)
 
         return self._cached(name, wanted, make)

@@ -36,13 +36,17 @@ class Drop:
     strength: float = 0.0  # torque limits of the servos, which hold the pose; 0: servos off
 
 
-DROPS = {
-    # limp on the face, on the back and on a side
-    "limp": Drop("falls", prone=0.4, supine=0.4, pose_noise_rad=0.35),
-    # limp in every orientation, those in between too
-    "any": Drop("any", prone=0.35, supine=0.35, pose_noise_rad=0.35, roll_spread_rad=np.pi / 4),
-    # [P 5.2] drops prone and supine, [T 2.6] with "small torques"
-    "paper": Drop("paper", prone=0.4, supine=0.6, pose_noise_rad=0.0, strength=0.05),
+# limp on the face, on the back and on a side
+_LIMP = Drop("falls", prone=0.4, supine=0.4, pose_noise_rad=0.35)
+# limp in every orientation, those in between too
+_ANY = Drop("any", prone=0.35, supine=0.35, pose_noise_rad=0.35, roll_spread_rad=np.pi / 4)
+# [P 5.2] drops prone and supine, [T 2.6] with "small torques"
+_PAPER = Drop("paper", prone=0.4, supine=0.6, pose_noise_rad=0.0, strength=0.05)
+DROPS: dict[str, tuple[Drop, ...]] = {  # equally many are dropped in each of these ways
+    "limp": (_LIMP,),
+    "any": (_ANY,),
+    "paper": (_PAPER,),
+    "varied": (_ANY, _PAPER),
 }
 
 
